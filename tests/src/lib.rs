@@ -1,0 +1,1 @@
+//! whole-rack tests live in tests/

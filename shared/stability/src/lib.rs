@@ -1,1 +1,3 @@
-//! stability
+//! stability: choosing impedances under delay, and when the loop around them is stable.
+
+pub mod fir;

@@ -1,1 +1,30 @@
-//! messages
+//! What travels between the boards of the rack: payloads and their header, nothing else.
+//!
+//! Every payload is plain old data (`bytemuck::Pod`): any bit pattern is a valid value, there is no
+//! pointer in it, so it may lie in shared memory and a corrupted one is a wrong number, never
+//! undefined behaviour.
+
+mod board_id;
+mod bus;
+mod command;
+mod control;
+mod event;
+mod grant;
+mod header;
+mod plant;
+pub mod registers;
+mod telemetry;
+
+pub use board_id::{BOARDS, BoardId};
+pub use bus::{BusWord, TransferRecord};
+pub use command::{Command, CommandKind, PathKind};
+pub use control::{ControlProbe, limits};
+pub use event::{Event, EventKind, Severity};
+pub use grant::{Grant, OpRecord, Reply, flags};
+pub use header::{Header, Kind};
+pub use plant::{AmplifierCommand, PlantProbe, PlantSample, drive_status};
+pub use telemetry::Telemetry;
+pub use vme::Ns;
+
+/// Number of joints of the arm.
+pub const JOINTS: usize = 7;

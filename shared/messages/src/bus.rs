@@ -1,0 +1,144 @@
+//! What bus transfers carry, and the record of their times.
+
+use bytemuck::{Pod, Zeroable};
+use vme::{Access, Direction, Status, Transfer, Width};
+
+/// One register content, moved by the transfer (`task`, `job`, `index`).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct BusWord {
+    /// Instant at which the register was sampled (read) or changes (write, 0 = as the bus decides), ns.
+    pub t: u64,
+    /// Byte address on the bus.
+    pub addr: u32,
+    /// Register content, as many low bits as the cycle is wide.
+    pub value: u32,
+    /// Activation number of the task.
+    pub job: u32,
+    /// Index of the task.
+    pub task: u16,
+    /// Index of the access in the job.
+    pub index: u16,
+}
+
+/// A [`Transfer`] as plain old data.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct TransferRecord {
+    /// Bus requested, ns.
+    pub requested: u64,
+    /// Bus granted, ns.
+    pub granted: u64,
+    /// Register sampled or changed, ns.
+    pub data_at: u64,
+    /// Bus free again, ns.
+    pub done: u64,
+    /// Byte address of the first cycle.
+    pub addr: u32,
+    /// Number of cycles.
+    pub n: u32,
+    /// Activation number of the task.
+    pub job: u32,
+    /// Index of the task.
+    pub task: u16,
+    /// Index of the access in the job.
+    pub index: u16,
+    /// Index of the slave window, `u16::MAX` where none answered.
+    pub slave: u16,
+    /// Address modifier.
+    pub am: u8,
+    /// 0 = D8, 1 = D16, 2 = D32.
+    pub width: u8,
+    /// 0 = read, 1 = write.
+    pub dir: u8,
+    /// 0 = ok, 1 = BERR*, 2 = access timeout.
+    pub status: u8,
+    /// Zero.
+    pub reserved: [u8; 2],
+}
+
+impl From<&Transfer> for TransferRecord {
+    fn from(transfer: &Transfer) -> Self {
+        TransferRecord {
+            requested: transfer.requested,
+            granted: transfer.granted,
+            data_at: transfer.data_at,
+            done: transfer.done,
+            addr: transfer.access.addr,
+            n: transfer.access.n,
+            job: transfer.job,
+            task: transfer.task,
+            index: transfer.index,
+            slave: transfer.slave.unwrap_or(u16::MAX),
+            am: transfer.access.am,
+            width: match transfer.access.width {
+                Width::D8 => 0,
+                Width::D16 => 1,
+                Width::D32 => 2,
+            },
+            dir: match transfer.access.dir {
+                Direction::Read => 0,
+                Direction::Write => 1,
+            },
+            status: match transfer.status {
+                Status::Ok => 0,
+                Status::BusError => 1,
+                Status::AccessTimeout => 2,
+            },
+            reserved: [0; 2],
+        }
+    }
+}
+
+impl TransferRecord {
+    /// True for a read by the master.
+    pub fn is_read(&self) -> bool {
+        self.dir == 0
+    }
+
+    /// True where a slave answered.
+    pub fn is_ok(&self) -> bool {
+        self.status == 0
+    }
+
+    /// The access that was asked for.
+    pub fn access(&self) -> Access {
+        Access {
+            am: self.am,
+            addr: self.addr,
+            width: match self.width {
+                0 => Width::D8,
+                1 => Width::D16,
+                _ => Width::D32,
+            },
+            dir: if self.is_read() { Direction::Read } else { Direction::Write },
+            n: self.n,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_transfer_keeps_its_access_as_plain_old_data() {
+        let access = Access { am: 0x3D, addr: 0x1234, width: Width::D16, dir: Direction::Write, n: 3 };
+        let transfer = Transfer {
+            task: 1,
+            job: 2,
+            index: 3,
+            access,
+            slave: None,
+            requested: 4,
+            granted: 5,
+            data_at: 6,
+            done: 7,
+            status: Status::BusError,
+        };
+        let record = TransferRecord::from(&transfer);
+        assert_eq!(record.access(), access);
+        assert!(!record.is_ok());
+        assert_eq!((record.requested, record.granted, record.data_at, record.done), (4, 5, 6, 7));
+    }
+}

@@ -1,0 +1,142 @@
+//! What the chassis tells a board to do, and what the board answers. No payload travels here.
+
+use bytemuck::{Pod, Zeroable};
+use vme::{Access, Direction, Op, Width};
+
+/// Permission to carry on to `until`. The bus transfers made to the board follow as
+/// [`crate::TransferRecord`]s.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct Grant {
+    /// Number of the window, from 0; a window that is run again keeps its number.
+    pub window: u64,
+    /// Start of the window, ns.
+    pub from: u64,
+    /// End of the window, ns.
+    pub until: u64,
+    /// A [`crate::BoardId`] by number.
+    pub board: u32,
+    /// Bits of [`flags`].
+    pub flags: u32,
+    /// Task that stands at its decision point at `until`, where [`flags::DECIDE`] is set.
+    pub task: u32,
+    /// Its activation number.
+    pub job: u32,
+}
+
+/// Bits of [`Grant::flags`] and [`Reply::flags`].
+pub mod flags {
+    /// Grant: first step, at time 0; boards show their initial state and programs.
+    pub const BOOT: u32 = 1;
+    /// Grant: a task of this board decides at `until`.
+    pub const DECIDE: u32 = 2;
+    /// Grant: the plant cut the window short: go back to the state at `from` and step again.
+    pub const RERUN: u32 = 4;
+    /// Grant: the run ends here; write out what is pending.
+    pub const FINISH: u32 = 8;
+    /// Reply: the operations that follow are the rest of the job; otherwise the last rest is used again.
+    pub const NEW_REST: u32 = 16;
+    /// Reply: the plant stopped early, at [`Reply::early`].
+    pub const EARLY: u32 = 32;
+    /// Reply: the operations that follow are a task's program (boot).
+    pub const PROGRAM: u32 = 64;
+}
+
+/// A board's answer to a grant. Operations follow as [`OpRecord`]s.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct Reply {
+    /// Number of the window answered.
+    pub window: u64,
+    /// Where the plant stopped, ns, where [`flags::EARLY`] is set.
+    pub early: u64,
+    /// A [`crate::BoardId`] by number.
+    pub board: u32,
+    /// Bits of [`flags`].
+    pub flags: u32,
+    /// Task whose operations follow.
+    pub task: u32,
+    /// Processor time that the step took in this process, ns of wall time; never part of a simulated-time record.
+    pub wall_ns: u32,
+}
+
+/// An [`Op`] as plain old data.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct OpRecord {
+    /// Duration of Exec, ns; interrupt level of Raise.
+    pub ns: u64,
+    /// Byte address of an access.
+    pub addr: u32,
+    /// Number of cycles of an access.
+    pub n: u32,
+    /// 0 = Exec, 1 = read, 2 = write, 3 = Raise, 4 = Decide.
+    pub kind: u32,
+    /// Address modifier in the low byte, width (0 = D8, 1 = D16, 2 = D32) in the next.
+    pub am_width: u32,
+}
+
+impl From<Op> for OpRecord {
+    fn from(op: Op) -> OpRecord {
+        let empty = OpRecord::zeroed();
+        match op {
+            Op::Exec(ns) => OpRecord { ns, ..empty },
+            Op::Access(access) => OpRecord {
+                addr: access.addr,
+                n: access.n,
+                kind: if access.dir == Direction::Read { 1 } else { 2 },
+                am_width: u32::from(access.am)
+                    | match access.width {
+                        Width::D8 => 0,
+                        Width::D16 => 1,
+                        Width::D32 => 2,
+                    } << 8,
+                ..empty
+            },
+            Op::Raise(level) => OpRecord { ns: level.into(), kind: 3, ..empty },
+            Op::Decide => OpRecord { kind: 4, ..empty },
+        }
+    }
+}
+
+impl OpRecord {
+    /// The operation; `None` where a board sent something that is none.
+    pub fn op(&self) -> Option<Op> {
+        let access = |dir| {
+            Some(Op::Access(Access {
+                am: self.am_width as u8,
+                addr: self.addr,
+                width: match self.am_width >> 8 {
+                    0 => Width::D8,
+                    1 => Width::D16,
+                    2 => Width::D32,
+                    _ => return None,
+                },
+                dir,
+                n: self.n,
+            }))
+        };
+        match self.kind {
+            0 => Some(Op::Exec(self.ns)),
+            1 => access(Direction::Read),
+            2 => access(Direction::Write),
+            3 => Some(Op::Raise(self.ns as u8)),
+            4 => Some(Op::Decide),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn operations_survive_the_way_through_shared_memory() {
+        let access = Access { am: 0x39, addr: 0xFFFF_0001, width: Width::D16, dir: Direction::Write, n: 64 };
+        for op in [Op::Exec(5), Op::Access(access), Op::Raise(7), Op::Decide] {
+            assert_eq!(OpRecord::from(op).op(), Some(op));
+        }
+        assert_eq!(OpRecord { kind: 9, ..OpRecord::zeroed() }.op(), None);
+    }
+}

@@ -1,0 +1,25 @@
+//! What the workstation reads from the control computer's dual-ported RAM.
+
+use bytemuck::{Pod, Zeroable};
+
+/// State block of the control computer.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Telemetry {
+    /// Instant at which the content was sampled by the read, ns.
+    pub t: u64,
+    /// Instant at which the control computer wrote the content, ns.
+    pub written: u64,
+    /// Epoch of the last command accepted.
+    pub epoch: u32,
+    /// Index of the segment in force, `u32::MAX` before the first.
+    pub segment: u32,
+    /// Safety state: 0 run, 1 degraded, 2 SS2 hold, 3 SS1 stop, 4 STO.
+    pub state: u32,
+    /// Heartbeat: activation number of the control task.
+    pub heartbeat: u32,
+    /// Tool position in the task frame, m.
+    pub position: [f64; 3],
+    /// Measured wrench in the task frame, N and Nm.
+    pub wrench: [f64; 6],
+}

@@ -18,8 +18,10 @@
 
 mod aba;
 mod crba;
+pub mod drives;
 mod inertia;
 mod kinematics;
+mod mismatch;
 mod model;
 mod rnea;
 pub mod rotation;
@@ -33,6 +35,7 @@ pub use aba::aba;
 pub use crba::crba;
 pub use inertia::BodyInertia;
 pub use kinematics::{Pose, TipMotion, forward_kinematics, jacobian, jdot_qd, tip_motion};
+pub use mismatch::Mismatch;
 pub use model::{ArmModel, Tool};
 pub use rnea::{bias, gravity_torque, rnea};
 pub use state::ArmState;

@@ -415,7 +415,7 @@ fn checked_inertia(doc: &Document, link: usize) -> Result<Inertia, UrdfError> {
 /// A rotation that takes z to the joint's axis; the identity where the axis is z.
 fn z_to(joint: &RawJoint) -> Result<M3, UrdfError> {
     let length = joint.axis.dot(joint.axis).sqrt();
-    if !(length > 1e-9) {
+    if length <= 1e-9 || length.is_infinite() {
         return Err(UrdfError::ZeroAxis {
             joint: joint.name.clone(),
         });

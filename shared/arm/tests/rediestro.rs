@@ -1,6 +1,7 @@
 //! What is known of REDIESTRO, held against the built-in model: isotropy, the table-top posture, the surrogate's anchors.
 
-use arm::{ArmModel, JointVector, crba, forward_kinematics, gravity_torque, jacobian};
+use arm::drives::DriveData;
+use arm::{ArmModel, JointMatrix, JointVector, crba, forward_kinematics, gravity_torque, jacobian};
 use nalgebra::{SMatrix, SymmetricEigen, Vector3};
 
 fn degrees(q: [f64; 7]) -> JointVector {
@@ -59,15 +60,22 @@ fn the_surrogate_masses_ask_for_the_torques_they_were_chosen_for() {
     for (torque, expected) in g.iter().zip([0.0, -78.0, -18.0, 77.0, 19.0, -6.0, 0.0]) {
         assert!((torque - expected).abs() < 0.6, "{g}");
     }
-    let j = jacobian(&model, &table_top());
-    let m = crba(&model, &table_top());
-    let task = (j * m.try_inverse().expect("a mass matrix") * j.transpose())
-        .try_inverse()
-        .expect("not singular");
-    let in_z = 1.0 / (j * m.try_inverse().expect("a mass matrix") * j.transpose())[(2, 2)];
+    let (j, m) = (jacobian(&model, &table_top()), crba(&model, &table_top()));
+    let rotors = JointMatrix::from_diagonal(
+        &DriveData::rediestro().each(|d| d.rotor_inertia_at_output_kg_m2),
+    );
+    let in_z = |m: JointMatrix| {
+        1.0 / (j * m.try_inverse().expect("a mass matrix") * j.transpose())[(2, 2)]
+    };
     println!(
-        "task inertia in z: free {in_z} kg, held in the other axes {} kg",
-        task[(2, 2)]
+        "task inertia in z: links {} kg, with rotors {} kg",
+        in_z(m),
+        in_z(m + rotors)
+    );
+    let stiffness = DriveData::rediestro().each(|d| d.stiffness_nm_per_rad);
+    println!(
+        "joint-only k_z {} kN/m",
+        1e-3 * in_z(JointMatrix::from_diagonal(&stiffness))
     );
     assert!(SymmetricEigen::new(m).eigenvalues.min() > 0.0);
 }

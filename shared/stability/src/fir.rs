@@ -3,7 +3,7 @@
 //! stability bounds are computed behind them.
 //!
 //! Windowed sinc with a Hamming window, cut-off at 1/16 of the stage's input rate, unit gain at DC
-//! (what `firwin(25, 1/8)` of SciPy returns). The response at the cut-off is 0.511 (−5.8 dB); it is
+//! (`firwin(25, 1/8)` of SciPy gives the same taps). The response at the cut-off is 0.511 (−5.8 dB); it is
 //! the −6 dB point of the ideal low-pass, as is usual for this design. The stage then drops to a
 //! quarter of its input rate, whose Nyquist frequency is 1/8 of the input rate: the attenuation is
 //! 39 dB there, and from 0.134 of the input rate on nothing passes above −50 dB.
@@ -79,6 +79,29 @@ mod tests {
             assert_eq!(taps[i].to_bits(), taps[TAPS - 1 - i].to_bits(), "tap {i}");
         }
         assert!((taps.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_taps_are_those_of_scipys_firwin() {
+        // scipy.signal.firwin(25, 1/8), the first half and the middle.
+        let scipy = [
+            -0.002166823682341475,
+            -0.0026117522005138123,
+            -0.003254991964352446,
+            -0.0029676076982096773,
+            1.5424013305083962e-18,
+            0.007479627882912816,
+            0.020684372212160032,
+            0.03958065653489831,
+            0.06256703382761004,
+            0.08660842247804355,
+            0.10783127345119793,
+            0.12243156388920391,
+            0.12763645053878167,
+        ];
+        for (i, (tap, reference)) in lowpass_taps().iter().zip(scipy).enumerate() {
+            assert!((tap - reference).abs() < 1e-16, "tap {i}: {tap}");
+        }
     }
 
     #[test]

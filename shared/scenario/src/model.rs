@@ -8,10 +8,10 @@ mod limit;
 mod plant;
 mod segment;
 
-pub use controller::{Controller, JointLimitTask, Scheme, ToolModel};
+pub use controller::{Controller, JointLimitTask, Scheme};
 pub use interfaces::{DaIo, EncoderIf, ForceSensorIf, ForceFilter, VelocitySource};
 pub use limit::{Limit, Measure};
-pub use plant::{Arm, Robot, Integrator, Joints, MismatchConfig, Plant, Surface, TaskFrame};
+pub use plant::{Arm, Robot, Integrator, Joints, MismatchConfig, Plant, Surface, TaskFrame, ToolModel};
 pub use segment::{Impedance, Path, Segment, ResolvedSegment};
 
 use serde::{Deserialize, Serialize};

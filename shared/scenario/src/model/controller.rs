@@ -1,5 +1,6 @@
 //! The control law's parameters.
 
+use super::ToolModel;
 use serde::{Deserialize, Serialize};
 
 /// Augmented hybrid impedance control and what follows it.
@@ -95,14 +96,4 @@ impl Default for JointLimitTask {
     fn default() -> Self {
         JointLimitTask { enabled: true, buffer_deg: 10.0, kp: 100.0, max_weight: 10.0 }
     }
-}
-
-/// The tool as the controller knows it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ToolModel {
-    /// Mass.
-    pub mass_kg: f64,
-    /// Centre of mass from the sensor origin, in sensor axes.
-    pub com_m: [f64; 3],
 }

@@ -30,6 +30,20 @@ pub struct Arm {
     pub start_rpy_deg: [f64; 3],
     /// Bring the posture exactly to the start pose (default) or take `posture_deg` as it stands.
     pub solve_posture: bool,
+    /// Origin of the force sensor in tip axes from the tool point; its axes are parallel to the tip's.
+    pub sensor_m: [f64; 3],
+    /// What the sensor carries (part of the last link's mass).
+    pub tool: ToolModel,
+}
+
+/// What hangs on the force sensor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ToolModel {
+    /// Mass.
+    pub mass_kg: f64,
+    /// Centre of mass from the sensor origin, in sensor axes.
+    pub com_m: [f64; 3],
 }
 
 /// Which kinematics and dynamics.
@@ -55,8 +69,11 @@ impl Default for Arm {
             drives: None,
             posture_deg: [69.2, -15.3, -72.0, -132.4, 159.8, 64.7, 104.0],
             start_position_m: [0.0; 3],
-            start_rpy_deg: [0.0; 3],
+            // the yaw of `posture_deg`
+            start_rpy_deg: [0.0, 0.0, -73.685],
             solve_posture: true,
+            sensor_m: [0.0, 0.0, -0.1],
+            tool: ToolModel { mass_kg: 0.8, com_m: [0.0, 0.0, 0.05] },
         }
     }
 }

@@ -1,0 +1,203 @@
+//! From a name or path to a checked scenario: read, find every key's place, apply overrides, check.
+
+use crate::error::{Problem, ScenarioError};
+use crate::model::{Scenario, Variant};
+use crate::{builtin, check, overrides};
+use miette::{NamedSource, SourceSpan};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::de::{DeTable, DeValue};
+use toml::{Table, Value};
+
+/// A longer file is no scenario.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// A scenario file that has been read, with the overrides of the command line applied.
+#[derive(Clone, Debug)]
+pub struct Document {
+    /// Name without folder and extension, for titles and folders.
+    pub name: String,
+    file: String,
+    text: String,
+    folder: PathBuf,
+    tree: Table,
+}
+
+/// Reads the scenario of that name or path and applies `overrides` (`key.path=value`). The whole of it,
+/// every variant included, has been checked when this returns.
+pub fn load(name_or_path: &str, overrides: &[String]) -> Result<Document, ScenarioError> {
+    let document = Document::read(name_or_path, overrides)?;
+    document.variants()?;
+    Ok(document)
+}
+
+impl Document {
+    fn read(name_or_path: &str, settings: &[String]) -> Result<Document, ScenarioError> {
+        let (file, text, folder) = match builtin::text(name_or_path) {
+            Some(text) => (name_or_path.to_owned(), text.to_owned(), PathBuf::new()),
+            None => read_file(name_or_path)?,
+        };
+        let name = Path::new(&file).file_stem().map_or_else(|| "scenario".into(), |stem| stem.to_string_lossy().into_owned());
+        let mut document = Document { name, file, text, folder, tree: Table::new() };
+        document.tree = document.text.parse::<Table>().map_err(|error| {
+            document.text_error("(file)", error.message(), error.span().unwrap_or(0..0))
+        })?;
+        for setting in settings {
+            let apply = || {
+                let (key, value) = overrides::parse(setting)?;
+                Ok((key, value))
+            };
+            let (key, value) = apply().map_err(|problem| from_override("--set", problem))?;
+            overrides::set(&mut document.tree, &key, value).map_err(|problem| from_override("--set", problem))?;
+        }
+        Ok(document)
+    }
+
+    /// The scenario without any variant's overrides.
+    pub fn scenario(&self) -> Result<Scenario, ScenarioError> {
+        self.resolve(&self.tree, None)
+    }
+
+    /// Every variant with its scenario; one named `nominal` where the file names none.
+    pub fn variants(&self) -> Result<Vec<(Variant, Scenario)>, ScenarioError> {
+        let base = self.scenario()?;
+        if base.variants.is_empty() {
+            let nominal =
+                Variant { name: "nominal".into(), set: Table::new(), may_miss_surface: false, may_diverge: false };
+            return Ok(vec![(nominal, base)]);
+        }
+        let mut resolved = Vec::new();
+        for variant in &base.variants {
+            let mut tree = self.tree.clone();
+            for (key, value) in overrides::flatten(&variant.set) {
+                overrides::set(&mut tree, &key, value)
+                    .map_err(|problem| from_override(&format!("variant {}", variant.name), problem))?;
+            }
+            resolved.push((variant.clone(), self.resolve(&tree, Some(&variant.name))?));
+        }
+        Ok(resolved)
+    }
+
+    /// This scenario with one more override.
+    pub fn with(&self, key: &str, value: Value) -> Result<Document, ScenarioError> {
+        let mut document = self.clone();
+        overrides::set(&mut document.tree, key, value).map_err(|problem| from_override("--vary", problem))?;
+        Ok(document)
+    }
+
+    fn resolve(&self, tree: &Table, variant: Option<&str>) -> Result<Scenario, ScenarioError> {
+        let problem = |problem: Problem| self.locate(problem, variant);
+        finite(&mut String::new(), &Value::Table(tree.clone())).map_err(problem)?;
+        let mut scenario: Scenario = serde_path_to_error::deserialize(tree.clone()).map_err(|error| {
+            let path = error.path().to_string().replace('[', ".").replace(']', "");
+            let message = error.into_inner();
+            problem(Problem::new(path.trim_start_matches('.'), message.message()))
+        })?;
+        for file in [&mut scenario.arm.urdf, &mut scenario.arm.drives].into_iter().flatten() {
+            *file = self.folder.join(&*file).to_string_lossy().into_owned();
+        }
+        check::check(&scenario).map_err(problem)?;
+        Ok(scenario)
+    }
+
+    /// An error with the line of its key, or of the closest key above it that stands in the text.
+    fn locate(&self, problem: Problem, variant: Option<&str>) -> ScenarioError {
+        let span = DeTable::parse(&self.text).ok().map(|root| span_of(root.get_ref(), &problem.key));
+        match (span, variant) {
+            (Some(Found::Whole(span)), _) => self.text_error(&problem.key, &problem.message, span),
+            (_, Some(variant)) => from_override(&format!("{}: variant {variant}", self.file), problem),
+            (Some(Found::Parent(span)), None) => self.text_error(&problem.key, &problem.message, span),
+            (None, None) => self.text_error(&problem.key, &problem.message, 0..0),
+        }
+    }
+
+    fn text_error(&self, key: &str, message: &str, span: Range<usize>) -> ScenarioError {
+        let start = span.start.min(self.text.len());
+        let line = self.text.as_bytes()[..start].iter().filter(|byte| **byte == b'\n').count() + 1;
+        ScenarioError::Text {
+            file: self.file.clone(),
+            line,
+            key: key.to_owned(),
+            message: message.trim_end().to_owned(),
+            text: NamedSource::new(&self.file, self.text.clone()),
+            span: SourceSpan::from(start..span.end.clamp(start, self.text.len())),
+        }
+    }
+}
+
+fn read_file(path: &str) -> Result<(String, String, PathBuf), ScenarioError> {
+    let unreadable = |reason: String| ScenarioError::Read { name: path.to_owned(), reason };
+    let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
+    if size > MAX_BYTES {
+        return Err(unreadable(format!("it has {size} bytes; a scenario is a text file of at most {MAX_BYTES} bytes")));
+    }
+    let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|error| unreadable(format!("byte {} is not UTF-8 text", error.utf8_error().valid_up_to())))?;
+    let folder = Path::new(path).parent().map(Path::to_path_buf).unwrap_or_default();
+    let folder = std::path::absolute(&folder).unwrap_or(folder);
+    Ok((path.to_owned(), text, folder))
+}
+
+fn from_override(origin: &str, problem: Problem) -> ScenarioError {
+    ScenarioError::Override { origin: origin.to_owned(), key: problem.key, message: problem.message }
+}
+
+/// TOML has `nan` and `inf`; no key of a scenario takes them.
+fn finite(path: &mut String, value: &Value) -> Result<(), Problem> {
+    let length = path.len();
+    let mut visit = |part: &str, value: &Value| {
+        if length > 0 {
+            path.push('.');
+        }
+        path.push_str(part);
+        finite(path, value)?;
+        path.truncate(length);
+        Ok(())
+    };
+    match value {
+        Value::Float(number) if !number.is_finite() => {
+            Err(Problem::new(path.clone(), format!("is {number}, expected a finite number")))
+        }
+        Value::Table(table) => table.iter().try_for_each(|(key, value)| visit(key, value)),
+        Value::Array(array) => array.iter().enumerate().try_for_each(|(i, value)| visit(&i.to_string(), value)),
+        _ => Ok(()),
+    }
+}
+
+enum Found {
+    /// The key itself stands in the text.
+    Whole(Range<usize>),
+    /// Only a table or array above it.
+    Parent(Range<usize>),
+}
+
+fn span_of(root: &DeTable<'_>, key: &str) -> Found {
+    let mut table = Some(root);
+    let mut array = None;
+    let mut span = 0..0;
+    for part in key.split('.') {
+        let next: Option<&toml::Spanned<DeValue<'_>>> = if let Some(table) = table {
+            match table.get_key_value(part) {
+                Some((name, value)) => {
+                    // `[[segment]]` spans its header only through its key
+                    span = if value.get_ref().is_table() || value.get_ref().is_array() { name.span() } else { value.span() };
+                    Some(value)
+                }
+                None => None,
+            }
+        } else if let Some(array) = array {
+            let array: &toml::de::DeArray<'_> = array;
+            part.parse().ok().and_then(|i: usize| array.get(i)).inspect(|value| span = value.span())
+        } else {
+            None
+        };
+        match next.map(|value| value.get_ref()) {
+            Some(DeValue::Table(inner)) => (table, array) = (Some(inner), None),
+            Some(DeValue::Array(inner)) => (table, array) = (None, Some(inner)),
+            Some(_) => (table, array) = (None, None),
+            None => return Found::Parent(span),
+        }
+    }
+    Found::Whole(span)
+}

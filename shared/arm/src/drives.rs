@@ -157,11 +157,12 @@ impl JointDrive {
 
     /// Kinematic error of the gear at the output (rad) for a motor angle in rad.
     pub fn kinematic_error(&self, motor_rad: f64) -> f64 {
+        let waves = KINEMATIC_ERROR_HARMONICS
+            .iter()
+            .zip(&self.kinematic_error_phase_rad);
         let mut error = 0.0;
-        for k in 0..3 {
-            let phase =
-                KINEMATIC_ERROR_HARMONICS[k] * motor_rad + self.kinematic_error_phase_rad[k];
-            error += self.kinematic_error_rad[k] * libm::sin(phase);
+        for (amplitude, (harmonic, phase)) in self.kinematic_error_rad.iter().zip(waves) {
+            error += amplitude * libm::sin(harmonic * motor_rad + phase);
         }
         error
     }

@@ -3,17 +3,37 @@
 //! plane* is resolved ahead of the data it carries.
 //!
 //! * [`program`]: what a master does, as a list of operations.
-//! * [`rack`]: the description of bus, boards, processors and tasks.
+//! * [`rack`]: the description of bus, boards, processors and tasks; [`check`] refuses a bad one.
 //! * [`timing`]: resolves programs into transfers with exact times, up to the next decision point.
+//! * [`arbiter`], [`requester`], [`cycle`], [`interrupt`], [`adaptor`], [`processor`], [`traffic`],
+//!   [`fault`]: the parts it is made of, under the standard's names.
+//! * [`analysis`]: bounds that no observed time may exceed; [`accounting`]: what was observed.
+//! * [`queueing`]: the arbiter alone, under random load.
 
 #![warn(missing_docs)]
 
+// pub mod accounting;
+pub mod adaptor;
+// pub mod analysis;
+pub mod arbiter;
+pub mod check;
+pub mod cycle;
+pub mod fault;
+// pub mod figure;
+pub mod interrupt;
+pub mod processor;
 pub mod program;
+// pub mod queueing;
 pub mod rack;
+pub mod requester;
+pub mod timer;
 pub mod timing;
+pub mod traffic;
 
-pub use program::{Access, Direction, Op, Program, Status, Transfer, Width};
-pub use timing::{Stop, Timing};
+pub use check::RackError;
+pub use fault::{Fault, FaultKind, FaultPlan};
+pub use program::{Access, Direction, Op, Origin, Program, Status, Transfer, Width};
+pub use timing::{JobRecord, Log, Sink, Stop, Timing};
 
 /// Simulated time or duration in integer nanoseconds.
 pub type Ns = u64;

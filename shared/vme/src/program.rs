@@ -3,11 +3,23 @@
 use crate::Ns;
 
 /// Data width of a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    serde::Serialize,
+    serde::Deserialize,
+)]
 pub enum Width {
     /// Byte.
     D8,
     /// Word.
+    #[default]
     D16,
     /// Longword.
     D32,
@@ -24,27 +36,34 @@ impl Width {
     }
 }
 
-/// Direction of a transfer, seen from the master.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What a cycle does, seen from the master.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Direction {
     /// The master reads a slave's register.
+    #[default]
     Read,
     /// The master writes a slave's register.
     Write,
+    /// Read-modify-write: a read and a write under one AS*; nobody comes between.
+    ReadModifyWrite,
+    /// Address-only (ADO): AS* without DS*; only location monitors notice it.
+    AddressOnly,
 }
 
 /// One transfer that a program asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Access {
-    /// Address modifier, for example `0x3D` (A24 supervisory data).
+    /// Address modifier, for example `0x3D` (A24 supervisory data). A block modifier
+    /// (`0x3B`, `0x3F`, `0x0B`, `0x0F`) makes a block transfer (BLT) of the `n` cycles.
     pub am: u8,
     /// Byte address of the first cycle.
     pub addr: u32,
     /// Data width of each cycle.
     pub width: Width,
-    /// Read or write.
+    /// Read, write, read-modify-write or address-only.
     pub dir: Direction,
-    /// Number of cycles: 1 for a single cycle, more for a block transfer (BLT).
+    /// Number of cycles: 1 for a single cycle, more for a block transfer or a run of single cycles.
     pub n: u32,
 }
 
@@ -55,7 +74,7 @@ pub enum Op {
     Exec(Ns),
     /// Transfers over the bus; the processor is stalled meanwhile.
     Access(Access),
-    /// Raises the interrupt request of this level.
+    /// Raises the interrupt request of this level (the processor card's own interrupter).
     Raise(u8),
     /// The data read so far are complete: the board decides what the rest of the job does.
     Decide,
@@ -69,20 +88,36 @@ pub type Program = Vec<Op>;
 pub enum Status {
     /// DTACK*: the slave answered.
     Ok,
-    /// BERR*: no slave answered before the bus timer.
+    /// BERR*: no slave answered before the bus timer, or an adaptor's link refused.
     BusError,
     /// The bus was not granted before the access timer.
     AccessTimeout,
 }
 
+/// Why a transfer took place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// An access of a task's program.
+    Program,
+    /// A task looks whether its event has come ([`crate::rack::Release::Poll`]).
+    Poll,
+    /// Interrupt acknowledge cycle of a handler.
+    Iack,
+    /// A handler's write that makes a RORA interrupter release its request.
+    InterruptRelease,
+    /// Background traffic; `task` counts [`crate::rack::Rack::traffic`].
+    Traffic,
+}
+
 /// One transfer as the bus carried it out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Transfer {
-    /// Index of the task that asked, in [`crate::rack::Rack::tasks`].
+    /// Index of the task that asked, in [`crate::rack::Rack::tasks`] (see [`Origin`] for others).
     pub task: u16,
     /// Activation number of the task, from 0.
     pub job: u32,
     /// Index of this access among the accesses of the job, from 0, before and after the decision.
+    /// A retry after BERR* carries the same index.
     pub index: u16,
     /// What was asked for.
     pub access: Access,
@@ -92,10 +127,21 @@ pub struct Transfer {
     pub requested: Ns,
     /// Bus granted.
     pub granted: Ns,
-    /// A read: the instant at which the slave's register is sampled. A write: the instant at which it changes.
+    /// A read: the instant at which the slave's register is sampled. A write: the instant at which it
+    /// changes. An error: the instant of BERR*.
     pub data_at: Ns,
     /// The bus is free again.
     pub done: Ns,
     /// How it ended.
     pub status: Status,
+    /// Why it took place.
+    pub origin: Origin,
+    /// Master on the bus, as [`crate::Timing::master_name`] counts.
+    pub master: u16,
+    /// Time that the bus was kept from others for it: arbitration and cycles.
+    pub held_ns: Ns,
+    /// The processor went on before the cycle ran; an error reached it late, as an interrupt.
+    pub posted: bool,
+    /// 0 at first, one more for each retry after BERR*.
+    pub attempt: u8,
 }

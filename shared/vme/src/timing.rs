@@ -1,13 +1,31 @@
 //! The timing plane: resolves the tasks' programs into transfers with exact times.
 //!
-//! It depends on programs and statuses, never on data values. Data change timing only at decision
-//! points ([`Op::Decide`]): [`Timing::advance`] stops there, and the board that runs the task says
-//! with [`Timing::resume`] how the job goes on. `Timing` is pure and cheap to clone: the chassis runs
-//! a copy ahead and drops it when the plant cuts a window short.
+//! Bus, processors and interrupts are one discrete-event model in integer nanoseconds: a stalled
+//! access lengthens a task, a task's end moves a request. It depends on programs, statuses and the
+//! fault plan, never on data values. Data change timing only at decision points ([`Op::Decide`]):
+//! [`Timing::advance`] stops there, and the board that runs the task says with [`Timing::resume`] how
+//! the job goes on. `Timing` is pure and cheap to clone (use `clone_from`, which keeps memory): the
+//! chassis runs a copy ahead and drops it when the plant cuts a window short.
+//!
+//! [`Op::Decide`]: crate::Op::Decide
 
-use crate::program::{Access, Direction, Op, Program, Status, Transfer};
-use crate::rack::Rack;
+mod bus;
+mod processor;
+mod task;
+mod wiring;
+
 use crate::Ns;
+use crate::arbiter::Arbiter;
+use crate::check::RackError;
+use crate::fault::{FaultKind, FaultPlan};
+use crate::interrupt::Line;
+use crate::program::{Origin, Transfer};
+use crate::rack::{Rack, Release};
+use crate::requester::Requester;
+use crate::traffic::ArrivalStream;
+use std::sync::Arc;
+pub use task::JobRecord;
+use wiring::{Source, Wiring};
 
 /// Why [`Timing::advance`] stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,60 +39,194 @@ pub enum Stop {
         /// Its activation number.
         job: u32,
     },
+    /// A release of a task with [`crate::rack::Overrun::Trip`] found the job before still running.
+    Overrun {
+        /// Index of the task.
+        task: u16,
+        /// Activation number of the lost release.
+        job: u32,
+    },
+    /// A fault begins at this instant; nothing else of this instant has happened yet.
+    Fault {
+        /// Index in [`FaultPlan::faults`].
+        fault: u16,
+    },
+}
+
+/// Receives what happens, in the order of its instants.
+pub trait Sink {
+    /// A transfer whose data moved, or that failed, at `transfer.data_at`.
+    fn transfer(&mut self, transfer: &Transfer);
+    /// A job that has ended.
+    fn job(&mut self, _job: &JobRecord) {}
+}
+
+/// The transfers of programs alone: what the data plane carries out.
+impl Sink for Vec<Transfer> {
+    fn transfer(&mut self, transfer: &Transfer) {
+        if transfer.origin == Origin::Program {
+            self.push(*transfer);
+        }
+    }
+}
+
+/// Everything that happens.
+#[derive(Clone, Debug, Default)]
+pub struct Log {
+    /// All transfers, those of polling, interrupts and background traffic too.
+    pub transfers: Vec<Transfer>,
+    /// All jobs.
+    pub jobs: Vec<JobRecord>,
+}
+
+impl Sink for Log {
+    fn transfer(&mut self, transfer: &Transfer) {
+        self.transfers.push(*transfer);
+    }
+    fn job(&mut self, job: &JobRecord) {
+        self.jobs.push(*job);
+    }
+}
+
+/// What went wrong, or by interrupt, so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Transfers that ended in BERR*.
+    pub bus_errors: u32,
+    /// Requests given up by the access timer.
+    pub access_timeouts: u32,
+    /// Posted writes whose failure arrived late.
+    pub posted_errors: u32,
+    /// Interrupts taken up by a processor.
+    pub interrupts: u32,
+    /// Events hidden behind a pending request of the same interrupter.
+    pub merged_interrupts: u32,
+}
+
+#[derive(Clone, Debug)]
+struct Generator {
+    arrivals: ArrivalStream,
+    count: u32,
+    set_up: bool,
 }
 
 /// Bus, processors and tasks, at one instant.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Timing {
-    rack: Rack,
+    wiring: Arc<Wiring>,
+    faults: Arc<FaultPlan>,
+    /// Begins and ends of faults in order: instant, fault, whether it begins.
+    fault_times: Arc<[(Ns, u16, bool)]>,
+    next_fault: usize,
     now: Ns,
-    tasks: Vec<TaskState>,
-}
-
-#[derive(Clone, Debug)]
-struct TaskState {
-    program: Program,
-    /// What follows the decision of the running job.
-    rest: Program,
-    job: u32,
-    index: u16,
-    pc: usize,
-    decided: bool,
-    step: Step,
-    /// Time of the next event of this task.
-    at: Ns,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Step {
-    /// Waits for its release at `at`.
-    Idle,
-    /// Takes up the operation at `pc` at `at`.
-    Ready,
-    /// The slave answers (or the bus timer expires) at `at`.
-    OnBus(Transfer),
-    /// Waits for [`Timing::resume`].
-    Deciding,
+    /// When each of [`Wiring::sources`] has its next event.
+    due: Vec<Ns>,
+    arbiter: Arbiter,
+    bus: bus::Bus,
+    masters: Vec<Requester>,
+    processors: Vec<processor::Processor>,
+    tasks: Vec<task::Task>,
+    lines: Vec<Line>,
+    generators: Vec<Generator>,
+    counters: Counters,
 }
 
 impl Timing {
     /// A rack at time 0, with empty programs; see [`Timing::set_program`].
-    pub fn new(rack: Rack) -> Timing {
-        let tasks = rack
-            .tasks
-            .iter()
-            .map(|task| TaskState {
-                program: Program::new(),
-                rest: Program::new(),
-                job: 0,
-                index: 0,
-                pc: 0,
-                decided: false,
-                step: Step::Idle,
-                at: task.offset_ns,
+    pub fn new(rack: Rack) -> Result<Timing, RackError> {
+        Timing::with_faults(rack, FaultPlan::default())
+    }
+
+    /// A rack at time 0 in which these faults will happen. A fault's index that counts something that
+    /// the rack does not have is an error.
+    pub fn with_faults(rack: Rack, faults: FaultPlan) -> Result<Timing, RackError> {
+        let wiring = Wiring::new(rack)?;
+        let rack = &wiring.rack;
+        for (i, fault) in faults.faults.iter().enumerate() {
+            let (kind, index, n) = match fault.kind {
+                FaultKind::NoSlave(s) => ("slave", s, rack.slaves.len()),
+                FaultKind::Starvation(m) => ("master", m, wiring.masters.len()),
+                FaultKind::StuckBus => continue,
+                FaultKind::LostInterrupt(i) => ("interrupter", i, rack.interrupters.len()),
+                FaultKind::CableOut(a) => ("adaptor", a, rack.adaptors.len()),
+                FaultKind::Slow { task, .. } | FaultKind::Halt(task) => {
+                    ("task", task, rack.tasks.len())
+                }
+            };
+            if usize::from(index) >= n {
+                return Err(RackError::Unknown {
+                    party: format!("fault {i}"),
+                    kind,
+                    name: format!("number {index}"),
+                });
+            }
+        }
+        let mut fault_times: Vec<_> = (faults.faults.iter().enumerate())
+            .flat_map(|(i, fault)| {
+                [
+                    (fault.from_ns, i as u16, true),
+                    (fault.until_ns, i as u16, false),
+                ]
             })
             .collect();
-        Timing { rack, now: 0, tasks }
+        fault_times.sort_by_key(|&(at, i, begins)| (at, begins, i));
+
+        let mut due = vec![Ns::MAX; wiring.sources.len()];
+        due[Wiring::FAULT] = fault_times.first().map_or(Ns::MAX, |f| f.0);
+        for (t, task) in rack.tasks.iter().enumerate() {
+            match task.release {
+                Release::Timer => due[wiring.task(t as u16)] = task.offset_ns,
+                Release::Poll(_) => due[wiring.dispatch(wiring.processor_of_task[t])] = 0,
+                Release::Interrupt(_) => {}
+            }
+        }
+        for (i, interrupter) in rack.interrupters.iter().enumerate() {
+            due[wiring.interrupter(i as u16)] =
+                interrupter.ticks.map_or(Ns::MAX, |ticks| ticks.at(0));
+        }
+        let generators: Vec<Generator> = (rack.traffic.iter().enumerate())
+            .map(|(g, t)| Generator {
+                arrivals: ArrivalStream::new(
+                    t.arrivals,
+                    t.period_ns,
+                    t.offset_ns,
+                    t.seed,
+                    g as u64,
+                ),
+                count: 0,
+                set_up: false,
+            })
+            .collect();
+        for (g, generator) in generators.iter().enumerate() {
+            due[wiring.traffic(g as u16)] = generator.arrivals.next();
+        }
+        Ok(Timing {
+            arbiter: Arbiter::new(rack.bus.arbiter),
+            bus: bus::Bus {
+                owner: None,
+                phase: bus::Phase::Free,
+            },
+            masters: (wiring.masters.iter())
+                .map(|m| Requester {
+                    place: m.place,
+                    release: m.release,
+                    queue: Vec::new(),
+                })
+                .collect(),
+            processors: vec![processor::Processor::new(); rack.processors.len()],
+            tasks: (rack.tasks.iter().enumerate())
+                .map(|(t, task)| task::Task::new(t as u16, &task.release))
+                .collect(),
+            lines: vec![Line::default(); rack.interrupters.len()],
+            generators,
+            counters: Counters::default(),
+            now: 0,
+            due,
+            faults: Arc::new(faults),
+            fault_times: fault_times.into(),
+            next_fault: 0,
+            wiring: Arc::new(wiring),
+        })
     }
 
     /// Simulated time reached.
@@ -82,121 +234,114 @@ impl Timing {
         self.now
     }
 
-    /// What the task does in each job from its next release on.
-    pub fn set_program(&mut self, task: u16, program: &[Op]) {
-        let task = &mut self.tasks[task as usize];
-        task.program.clear();
-        task.program.extend_from_slice(program);
+    /// The rack, with every card in its slot.
+    pub fn rack(&self) -> &Rack {
+        &self.wiring.rack
     }
 
-    /// How the job that stands at its decision point goes on.
-    pub fn resume(&mut self, task: u16, rest: &[Op]) {
-        let task = &mut self.tasks[task as usize];
-        debug_assert!(matches!(task.step, Step::Deciding));
-        task.rest.clear();
-        task.rest.extend_from_slice(rest);
-        task.pc = 0;
-        task.decided = true;
-        task.step = Step::Ready;
-        task.at = self.now;
+    /// What went wrong so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
     }
 
-    /// Runs to the next decision point, or to `limit` if that comes first (events at `limit` are left
-    /// for later). Pushes every transfer whose data moved on the way, in the order of `data_at`.
-    pub fn advance(&mut self, limit: Ns, transfers: &mut Vec<Transfer>) -> Stop {
+    /// Releases of the task that were lost because the job before still ran.
+    pub fn skipped(&self, task: u16) -> u32 {
+        self.tasks[task as usize].skipped
+    }
+
+    /// Name of a master on the bus. Masters count processor cards first, then adaptors, then
+    /// generators of traffic; those that work through an adaptor are not counted.
+    pub fn master_name(&self, master: u16) -> Option<&str> {
+        self.wiring
+            .masters
+            .get(master as usize)
+            .map(|m| m.name.as_str())
+    }
+
+    /// Masters on the bus.
+    pub fn masters(&self) -> usize {
+        self.wiring.masters.len()
+    }
+
+    /// Runs to the next stop, or to `limit` if that comes first (events at `limit` are left for
+    /// later). Gives the sink every transfer whose data moved on the way, in the order of `data_at`.
+    pub fn advance(&mut self, limit: Ns, sink: &mut impl Sink) -> Stop {
         loop {
-            let next = (0..self.tasks.len())
-                .filter(|&i| !matches!(self.tasks[i].step, Step::Deciding))
-                .min_by_key(|&i| (self.tasks[i].at, i));
-            let Some(i) = next.filter(|&i| self.tasks[i].at < limit) else {
-                self.now = limit;
-                return Stop::Limit;
-            };
-            self.now = self.tasks[i].at;
-            if self.event(i, transfers) {
-                return Stop::Decision { task: i as u16, job: self.tasks[i].job };
-            }
-        }
-    }
-
-    /// Carries out the next event of task `i`; true where it is a decision point.
-    fn event(&mut self, i: usize, transfers: &mut Vec<Transfer>) -> bool {
-        let task = &mut self.tasks[i];
-        match task.step {
-            Step::Deciding => {}
-            Step::Idle => {
-                task.pc = 0;
-                task.index = 0;
-                task.decided = false;
-                task.step = Step::Ready;
-            }
-            Step::OnBus(transfer) => {
-                transfers.push(transfer);
-                let stall = match transfer.access.dir {
-                    Direction::Read => self.rack.bus.read_stall_ns,
-                    Direction::Write => 0,
-                };
-                task.at = transfer.done + stall;
-                task.step = Step::Ready;
-            }
-            Step::Ready => {
-                let ops = if task.decided { &task.rest } else { &task.program };
-                let op = ops.get(task.pc).copied();
-                task.pc += 1;
-                match op {
-                    Some(Op::Exec(ns)) => task.at += ns,
-                    Some(Op::Access(access)) => {
-                        let transfer = transfer(&self.rack, i as u16, task.job, task.index, access, task.at);
-                        task.index += 1;
-                        task.at = transfer.data_at;
-                        task.step = Step::OnBus(transfer);
-                    }
-                    Some(Op::Raise(_)) => {}
-                    Some(Op::Decide) => {
-                        task.step = Step::Deciding;
-                        return true;
-                    }
-                    None => {
-                        // a release that passed while the job still ran is skipped
-                        let spec = &self.rack.tasks[i];
-                        let periods = (task.at.saturating_sub(spec.offset_ns)) / spec.period_ns + 1;
-                        task.at = spec.offset_ns + periods * spec.period_ns;
-                        task.job = periods as u32;
-                        task.step = Step::Idle;
-                    }
+            let mut next = 0;
+            for i in 1..self.due.len() {
+                if self.due[i] < self.due[next] {
+                    next = i;
                 }
             }
+            let at = self.due[next];
+            if at >= limit {
+                self.now = self.now.max(limit);
+                return Stop::Limit;
+            }
+            self.now = at;
+            if let Some(stop) = self.event(self.wiring.sources[next], sink) {
+                return stop;
+            }
         }
-        false
+    }
+
+    fn event(&mut self, source: Source, sink: &mut impl Sink) -> Option<Stop> {
+        match source {
+            Source::Fault => return self.fault_event(),
+            Source::Bus => self.bus_event(sink),
+            Source::Processor(p) => self.processor_event(p, sink),
+            Source::Dispatch(p) => return self.dispatch(p, sink),
+            Source::Interrupter(i) => {
+                let due = self.wiring.interrupter(i);
+                let line = &mut self.lines[i as usize];
+                line.tick += 1;
+                let ticks = self.wiring.rack.interrupters[i as usize].ticks;
+                self.due[due] = ticks.map_or(Ns::MAX, |ticks| ticks.at(line.tick));
+                self.raise(i);
+            }
+            Source::Task(t) => return self.tick(t),
+            Source::Traffic(g) => self.traffic_event(g, sink),
+            Source::AccessTimer(m) => self.access_timeout(m, sink),
+            Source::Arbiter => self.arbitrate(),
+        }
+        None
     }
 }
 
-/// The transfer with this rack's constant latencies.
-fn transfer(rack: &Rack, task: u16, job: u32, index: u16, access: Access, requested: Ns) -> Transfer {
-    let slave = rack.slaves.iter().position(|slave| {
-        slave.am == access.am && access.addr >= slave.base && access.addr - slave.base < slave.size
-    });
-    let granted = requested + rack.bus.arbitration_ns;
-    let answer = match slave.map(|s| &rack.slaves[s]) {
-        Some(slave) => match access.dir {
-            Direction::Read => slave.read_ns,
-            Direction::Write => slave.write_ns,
-        },
-        None => rack.bus.bus_timer_ns,
-    };
-    let cycle = rack.bus.address_ns + answer;
-    let n = Ns::from(access.n.max(1));
-    let data_at = granted + n * cycle + (n - 1) * rack.bus.handshake_ns;
-    Transfer {
-        task,
-        job,
-        index,
-        access,
-        slave: slave.map(|s| s as u16),
-        requested,
-        granted,
-        data_at,
-        done: data_at + rack.bus.handshake_ns,
-        status: if slave.is_some() { Status::Ok } else { Status::BusError },
+impl Clone for Timing {
+    fn clone(&self) -> Self {
+        Timing {
+            wiring: self.wiring.clone(),
+            faults: self.faults.clone(),
+            fault_times: self.fault_times.clone(),
+            due: self.due.clone(),
+            arbiter: self.arbiter.clone(),
+            masters: self.masters.clone(),
+            processors: self.processors.clone(),
+            tasks: self.tasks.clone(),
+            lines: self.lines.clone(),
+            generators: self.generators.clone(),
+            ..*self
+        }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        self.wiring.clone_from(&from.wiring);
+        self.faults.clone_from(&from.faults);
+        self.fault_times.clone_from(&from.fault_times);
+        self.next_fault = from.next_fault;
+        self.now = from.now;
+        self.due.clone_from(&from.due);
+        self.arbiter.clone_from(&from.arbiter);
+        self.bus = from.bus;
+        self.masters.clone_from(&from.masters);
+        self.processors.clone_from(&from.processors);
+        self.tasks.clone_from(&from.tasks);
+        self.lines.clone_from(&from.lines);
+        self.generators.clone_from(&from.generators);
+        self.counters = from.counters;
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -563,7 +563,7 @@ impl Rack {
                 am: access.am,
             });
         }
-        if access.dir == Direction::AddressOnly {
+        if access.is_address_only() {
             return Ok(());
         }
         let Some(slave) = self.slaves.iter().find(|slave| answers(slave, access)) else {

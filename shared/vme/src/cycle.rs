@@ -5,20 +5,25 @@
 //! no slave can answer (no window, too wide, misaligned) ends in BERR* when the bus timer expires.
 
 use crate::Ns;
-use crate::program::{Access, Direction, Status, Width};
+use crate::program::{Access, Direction, READ_MODIFY_WRITE, Status, Width};
 use crate::rack::{Bus, Slave};
 
 /// A block transfer must not cross this boundary.
 pub const BLOCK_BYTES: u32 = 256;
 
+/// What the lines AM0–AM5 carry.
+const fn lines(am: u8) -> u8 {
+    am & !READ_MODIFY_WRITE
+}
+
 /// Whether this address modifier asks for a block transfer.
 pub const fn is_block(am: u8) -> bool {
-    matches!(am, 0x3B | 0x3F | 0x0B | 0x0F)
+    matches!(lines(am), 0x3B | 0x3F | 0x0B | 0x0F)
 }
 
 /// The single-cycle modifier of the address space and privilege of `am`.
 pub const fn single(am: u8) -> u8 {
-    match am {
+    match lines(am) {
         0x3B => 0x39,
         0x3F => 0x3D,
         0x0B => 0x09,
@@ -29,7 +34,7 @@ pub const fn single(am: u8) -> u8 {
 
 /// Address bits of the space that `am` selects; `None` for a modifier that is not modelled.
 pub const fn address_bits(am: u8) -> Option<u32> {
-    match am {
+    match lines(am) {
         0x29 | 0x2D => Some(16),
         0x39 | 0x3A | 0x3B | 0x3D | 0x3E | 0x3F => Some(24),
         0x09 | 0x0A | 0x0B | 0x0D | 0x0E | 0x0F => Some(32),
@@ -71,7 +76,7 @@ pub fn plan(bus: &Bus, access: &Access, slave: Option<(u16, &Slave)>, splits: bo
     let cycles = access.n.max(1);
     let bytes = access.width.bytes();
     let block = is_block(access.am);
-    if access.dir == Direction::AddressOnly {
+    if access.is_address_only() {
         // nobody has to answer: no DS*, no DTACK*
         let slave = slave.map(|(index, _)| index);
         return Plan {
@@ -112,9 +117,9 @@ pub fn plan(bus: &Bus, access: &Access, slave: Option<(u16, &Slave)>, splits: bo
     };
     let room = (window.size - (access.addr - window.base)) / bytes;
     let answer_ns = match access.dir {
+        _ if access.reads_and_modifies() => window.read_ns + bus.handshake_ns + window.write_ns,
         Direction::Write => window.write_ns,
-        Direction::ReadModifyWrite => window.read_ns + bus.handshake_ns + window.write_ns,
-        Direction::Read | Direction::AddressOnly => window.read_ns,
+        Direction::Read => window.read_ns,
     };
     Plan {
         slave: Some(index),
@@ -130,7 +135,7 @@ pub fn plan(bus: &Bus, access: &Access, slave: Option<(u16, &Slave)>, splits: bo
 pub fn fit(access: &Access, window: &Slave) -> Option<Misfit> {
     let bytes = access.width.bytes();
     let end = u64::from(access.addr) + u64::from(access.n.max(1)) * u64::from(bytes);
-    if access.dir == Direction::AddressOnly {
+    if access.is_address_only() {
         None
     } else if access.width > window.width {
         Some(Misfit::TooWide)
@@ -258,7 +263,13 @@ mod tests {
     #[test]
     fn read_modify_write_holds_the_bus_for_both_halves() {
         let (bus, ram) = (Bus::default(), ram());
-        let rmw = access(0x39, 0x1000, Width::D16, Direction::ReadModifyWrite, 1);
+        let rmw = access(
+            0x39 | READ_MODIFY_WRITE,
+            0x1000,
+            Width::D16,
+            Direction::Write,
+            1,
+        );
         let burst = plan(&bus, &rmw, Some((0, &ram)), false).burst(&bus, rmw.addr, 0, 0);
         assert_eq!(burst.data_ns, 35 + 200 + 100 + 150);
     }
@@ -325,7 +336,7 @@ mod tests {
     #[test]
     fn an_address_only_cycle_needs_no_slave() {
         let bus = Bus::default();
-        let ado = access(0x39, 0x9000, Width::D8, Direction::AddressOnly, 1);
+        let ado = access(0x39, 0x9000, Width::D8, Direction::Write, 0);
         let burst = plan(&bus, &ado, None, false).burst(&bus, ado.addr, 0, 0);
         assert_eq!((burst.status, burst.done_ns), (Status::Ok, 135));
     }

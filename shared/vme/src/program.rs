@@ -36,7 +36,7 @@ impl Width {
     }
 }
 
-/// What a cycle does, seen from the master.
+/// Direction of a transfer, seen from the master.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direction {
@@ -45,26 +45,46 @@ pub enum Direction {
     Read,
     /// The master writes a slave's register.
     Write,
-    /// Read-modify-write: a read and a write under one AS*; nobody comes between.
-    ReadModifyWrite,
-    /// Address-only (ADO): AS* without DS*; only location monitors notice it.
-    AddressOnly,
 }
 
 /// One transfer that a program asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Access {
     /// Address modifier, for example `0x3D` (A24 supervisory data). A block modifier
-    /// (`0x3B`, `0x3F`, `0x0B`, `0x0F`) makes a block transfer (BLT) of the `n` cycles.
+    /// (`0x3B`, `0x3F`, `0x0B`, `0x0F`) makes a block transfer (BLT) of the `n` cycles;
+    /// [`READ_MODIFY_WRITE`] added to it a read-modify-write.
     pub am: u8,
     /// Byte address of the first cycle.
     pub addr: u32,
     /// Data width of each cycle.
     pub width: Width,
-    /// Read, write, read-modify-write or address-only.
+    /// Read or write; a read-modify-write is a write that reads first.
     pub dir: Direction,
-    /// Number of cycles: 1 for a single cycle, more for a block transfer or a run of single cycles.
+    /// Number of cycles: 1 for a single cycle, more for a block transfer or a run of single cycles,
+    /// 0 for an address-only cycle (AS* without DS*, noticed by location monitors alone).
     pub n: u32,
+}
+
+/// Added to the six bits of an address modifier: the cycle reads and writes under one AS*, and nobody
+/// comes between. No AM line carries it.
+pub const READ_MODIFY_WRITE: u8 = 0x80;
+
+impl Access {
+    /// Whether it reads and writes in one cycle.
+    pub const fn reads_and_modifies(&self) -> bool {
+        self.am & READ_MODIFY_WRITE != 0
+    }
+
+    /// Whether it moves no data.
+    pub const fn is_address_only(&self) -> bool {
+        self.n == 0
+    }
+
+    /// Whether the master waits for a slave's data.
+    pub const fn awaits_data(&self) -> bool {
+        !self.is_address_only()
+            && (matches!(self.dir, Direction::Read) || self.reads_and_modifies())
+    }
 }
 
 /// One operation of a task.

@@ -209,10 +209,7 @@ impl Timing {
             Client::Traffic(_) => false,
         };
         let mut plan = self.wiring.plan(&transfer.access, splits);
-        if let Some(slave) = plan
-            .slave
-            .filter(|_| transfer.access.dir != Direction::AddressOnly)
-        {
+        if let Some(slave) = plan.slave.filter(|_| !transfer.access.is_address_only()) {
             let dead = self
                 .faults
                 .holds(self.now, FaultKind::NoSlave(slave))
@@ -307,7 +304,7 @@ impl Timing {
             self.counters.bus_errors += 1;
             return;
         }
-        let noticed = transfer.access.dir != Direction::Read;
+        let noticed = transfer.access.dir == Direction::Write || transfer.access.is_address_only();
         if let Some(line) = transfer
             .slave
             .filter(|_| noticed)

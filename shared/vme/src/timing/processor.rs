@@ -484,9 +484,10 @@ impl Timing {
 
     /// The bus has done with the access that stalls this processor.
     pub(super) fn access_ended(&mut self, p: u16, transfer: &Transfer) {
-        let mut stall_ns = match transfer.access.dir {
-            Direction::Read | Direction::ReadModifyWrite => self.wiring.rack.bus.read_stall_ns,
-            Direction::Write | Direction::AddressOnly => 0,
+        let mut stall_ns = if transfer.access.awaits_data() {
+            self.wiring.rack.bus.read_stall_ns
+        } else {
+            0
         };
         if let Some(adaptor) = self.wiring.processors[p as usize].1 {
             stall_ns = link_ns(&self.wiring.rack.adaptors[adaptor as usize], transfer).1;
@@ -615,9 +616,10 @@ impl Timing {
 
 /// Link time of a workstation's access on the way in and out.
 fn link_ns(spec: &crate::adaptor::Adaptor, transfer: &Transfer) -> (Ns, Ns) {
-    let both = match transfer.access.dir {
-        Direction::Read | Direction::ReadModifyWrite => spec.link_read_ns,
-        Direction::Write | Direction::AddressOnly => spec.link_write_ns,
+    let both = if transfer.access.awaits_data() {
+        spec.link_read_ns
+    } else {
+        spec.link_write_ns
     };
     (both / 2, both - both / 2)
 }

@@ -38,6 +38,16 @@ impl Bound {
         Self::ForceDelayOnly,
     ];
 
+    /// Its name in tables and JSON.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Published => "published",
+            Self::Pade => "pade",
+            Self::Exact => "exact",
+            Self::ForceDelayOnly => "force_delay_only",
+        }
+    }
+
     /// The largest a = ω_n T_s = ω_n τ/2 at damping ratio `zeta`.
     pub fn a_max(self, zeta: f64) -> f64 {
         let zeta2 = zeta * zeta;

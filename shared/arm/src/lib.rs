@@ -23,6 +23,7 @@ mod inertia;
 mod kinematics;
 mod mismatch;
 mod model;
+mod reach;
 mod rnea;
 pub mod rotation;
 mod slide;

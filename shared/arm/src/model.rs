@@ -163,12 +163,6 @@ impl ArmModel {
         self.slide.is_some()
     }
 
-    /// Distance from the second joint's origin to the tip with every link stretched out: an upper bound of the reach (m).
-    pub fn reach_bound(&self) -> f64 {
-        let length = |v: V3| v.dot(v).sqrt();
-        self.joints[2..].iter().map(|j| length(j.p)).sum::<f64>() + length(self.tip_p)
-    }
-
     /// The same arm under another gravity vector (m/s², base axes).
     pub fn with_gravity(mut self, gravity: Vector3<f64>) -> ArmModel {
         self.gravity = gravity.into();

@@ -188,7 +188,7 @@ impl Timing {
             .map(|(g, t)| Generator {
                 arrivals: ArrivalStream::new(
                     t.arrivals,
-                    t.period_ns,
+                    t.period_ns as f64,
                     t.offset_ns,
                     t.seed,
                     g as u64,

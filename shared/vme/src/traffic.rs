@@ -77,7 +77,10 @@ pub enum Arrivals {
 #[derive(Clone, Debug)]
 pub struct ArrivalStream {
     arrivals: Arrivals,
-    period_ns: Ns,
+    /// Mean time between two arrivals; need not be whole nanoseconds.
+    period: f64,
+    offset: Ns,
+    count: u64,
     next: Ns,
     random: ChaCha8Rng,
 }
@@ -86,8 +89,8 @@ impl ArrivalStream {
     /// A stream; `stream` keeps the numbers of several streams of one seed apart.
     pub fn new(
         arrivals: Arrivals,
-        period_ns: Ns,
-        offset_ns: Ns,
+        period: f64,
+        offset: Ns,
         seed: u64,
         stream: u64,
     ) -> ArrivalStream {
@@ -95,8 +98,10 @@ impl ArrivalStream {
         random.set_stream(stream);
         let mut arrival = ArrivalStream {
             arrivals,
-            period_ns,
-            next: offset_ns,
+            period,
+            offset,
+            count: 0,
+            next: offset,
             random,
         };
         if arrivals == Arrivals::Poisson {
@@ -112,11 +117,16 @@ impl ArrivalStream {
 
     /// Goes on to the arrival after.
     pub fn advance(&mut self) {
-        let gap = match self.arrivals {
-            Arrivals::Periodic => self.period_ns,
-            Arrivals::Poisson => exponential(&mut self.random, self.period_ns as f64),
+        self.next = match self.arrivals {
+            Arrivals::Periodic => {
+                self.count += 1;
+                self.offset
+                    .saturating_add((self.count as f64 * self.period + 0.5) as Ns)
+            }
+            Arrivals::Poisson => self
+                .next
+                .saturating_add(exponential(&mut self.random, self.period)),
         };
-        self.next = self.next.saturating_add(gap);
     }
 }
 
@@ -133,7 +143,7 @@ mod tests {
 
     #[test]
     fn poisson_gaps_have_the_mean_and_the_deviation_of_an_exponential() {
-        let mut stream = ArrivalStream::new(Arrivals::Poisson, 1000, 0, 1, 0);
+        let mut stream = ArrivalStream::new(Arrivals::Poisson, 1000.0, 0, 1, 0);
         let (mut sum, mut squares, n) = (0.0, 0.0, 200_000);
         for _ in 0..n {
             let before = stream.next();
@@ -151,7 +161,7 @@ mod tests {
 
     #[test]
     fn periodic_arrivals_start_at_the_offset() {
-        let mut stream = ArrivalStream::new(Arrivals::Periodic, 10, 3, 1, 0);
+        let mut stream = ArrivalStream::new(Arrivals::Periodic, 10.0, 3, 1, 0);
         assert_eq!(stream.next(), 3);
         stream.advance();
         assert_eq!(stream.next(), 13);

@@ -1,0 +1,163 @@
+//! The four encoder cards as a board of the rack.
+//!
+//! A register has the content of the exact instant of the access, or of a stated delay before it. A write to a
+//! status register clears it, whatever the value; other writes change nothing. Channels without a joint and addresses
+//! without a register read as zero. An access that failed on the bus gets no answer.
+
+use crate::counter::{self, IndexLatch};
+use crate::history::{History, counts_per_turn};
+use crate::velocity::{self, TIMER_NS};
+use board::{Board, Inputs, Outputs};
+use messages::registers::encoder;
+use messages::{BusWord, JOINTS, TransferRecord};
+use scenario::{Scenario, VelocitySource, nanoseconds};
+use vme::Ns;
+
+/// Number of cards.
+const CARDS: usize = JOINTS.div_ceil(encoder::CHANNELS_PER_CARD);
+
+/// The cards. They answer the accesses to the rack's slaves `encoder-1` to `encoder-4`.
+pub struct EncoderIf {
+    /// Base address and size of each card.
+    cards: [(u32, u32); CARDS],
+    counter_bits: u8,
+    velocity: VelocitySource,
+    window: Ns,
+    delay: Ns,
+    history: History,
+    index: [IndexLatch; JOINTS],
+    /// The index latches have followed the shafts up to here.
+    followed: f64,
+    /// Status registers of the channels.
+    status: [u32; JOINTS],
+}
+
+impl EncoderIf {
+    /// The cards that the scenario describes. The message says what is wrong with them.
+    pub fn new(scenario: &Scenario) -> Result<EncoderIf, String> {
+        let config = &scenario.encoder_if;
+        let drives = scenario.drives()?;
+        let mut cards = [(0, 0); CARDS];
+        for (k, card) in cards.iter_mut().enumerate() {
+            let name = format!("encoder-{}", k + 1);
+            let slave = (scenario.rack.slaves.iter().find(|slave| slave.name == name))
+                .ok_or_else(|| format!("the rack has no slave `{name}`"))?;
+            *card = (slave.base, slave.size);
+        }
+        let delay = nanoseconds(config.delay_ms / 1e3);
+        Ok(EncoderIf {
+            cards,
+            counter_bits: config.counter_bits,
+            velocity: config.velocity,
+            window: nanoseconds(config.velocity_window_us / 1e6),
+            delay,
+            history: History::new(&drives, delay + TIMER_NS, scenario.plant.rate_hz),
+            index: core::array::from_fn(|i| IndexLatch::new(counts_per_turn(&drives, i))),
+            followed: f64::NEG_INFINITY,
+            status: [0; JOINTS],
+        })
+    }
+
+    /// Joint and register offset behind an address.
+    fn channel(&self, addr: u32) -> Option<(usize, u32)> {
+        let (card, offset) = (self.cards.iter().enumerate())
+            .map(|(card, (base, size))| (card, addr.wrapping_sub(*base), *size))
+            .find_map(|(card, offset, size)| (offset < size).then_some((card, offset)))?;
+        let channel = (offset / encoder::CHANNEL) as usize;
+        let joint = card * encoder::CHANNELS_PER_CARD + channel;
+        (channel < encoder::CHANNELS_PER_CARD && joint < JOINTS)
+            .then_some((joint, offset % encoder::CHANNEL))
+    }
+
+    /// Content of a register at `t`.
+    fn content(&mut self, addr: u32, t: Ns) -> u32 {
+        let Some((joint, register)) = self.channel(addr) else {
+            return 0;
+        };
+        let t = self.delayed(t);
+        match register {
+            encoder::COUNT => {
+                counter::register(self.history.position(joint, t), self.counter_bits) as u32
+            }
+            encoder::VELOCITY => {
+                let speed = match self.velocity {
+                    VelocitySource::EdgeTime => {
+                        velocity::edge_time(&self.history, joint, t, self.window as f64)
+                    }
+                    VelocitySource::Tachometer => self.history.speed(joint, t),
+                };
+                (speed / encoder::VELOCITY_LSB).round() as i32 as u32
+            }
+            encoder::STATUS => self.status[joint],
+            encoder::INDEX => {
+                self.follow_index(t);
+                counter::register(self.index[joint].latched(), self.counter_bits) as u32
+            }
+            _ => 0,
+        }
+    }
+
+    fn write(&mut self, addr: u32) {
+        if let Some((joint, encoder::STATUS)) = self.channel(addr) {
+            self.status[joint] = 0;
+        }
+    }
+
+    /// Lets the index latches see the shafts up to `t`.
+    fn follow_index(&mut self, t: f64) {
+        if self.history.is_empty() {
+            return;
+        }
+        for i in self.history.until(self.followed)..self.history.until(t) {
+            if let Some(sample) = self.history.sample(i) {
+                for (latch, position) in self.index.iter_mut().zip(sample.position) {
+                    latch.follow(position);
+                }
+            }
+        }
+        for (joint, latch) in self.index.iter_mut().enumerate() {
+            latch.follow(self.history.position(joint, t));
+        }
+        self.followed = t;
+    }
+
+    fn delayed(&self, t: Ns) -> f64 {
+        t as f64 - self.delay as f64
+    }
+}
+
+impl Board for EncoderIf {
+    fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
+        for sample in &inputs.mail.plant {
+            self.history.push(sample);
+        }
+        for transfer in inputs.transfers.iter().filter(|transfer| transfer.is_ok()) {
+            let bytes = transfer.access().width.bytes();
+            let TransferRecord {
+                data_at: t,
+                job,
+                task,
+                index,
+                ..
+            } = *transfer;
+            for cycle in 0..transfer.n {
+                let addr = transfer.addr.wrapping_add(cycle * bytes);
+                if transfer.is_read() {
+                    let value = self.content(addr, t);
+                    out.mail.words.push(BusWord {
+                        t,
+                        addr,
+                        value,
+                        job,
+                        task,
+                        index,
+                    });
+                } else {
+                    self.write(addr);
+                }
+            }
+        }
+        self.follow_index(self.delayed(inputs.until));
+        self.history.forget(inputs.until);
+    }
+}

@@ -1,1 +1,23 @@
-//! channels
+//! Zero-copy channels between the boards of a run: iceoryx2 between processes, plain copies inside one.
+//!
+//! * [`Domain`]: one iceoryx2 domain per run, with its own prefix and folder; two runs never meet.
+//! * [`Exchange`]: the mail of one process's boards, over [`board::routes`].
+//! * [`Port`], [`Sender`]: one typed channel.
+//! * [`Bell`]: wakes a process up; a word in shared memory and a futex.
+//!
+//! Every failure is a [`ChannelError`] that names the channel; nothing here waits without a limit.
+
+#![warn(missing_docs)]
+
+mod bell;
+mod domain;
+mod error;
+mod exchange;
+mod pod;
+mod port;
+
+pub use bell::{Bell, Bells};
+pub use domain::{Domain, remove_leftovers};
+pub use error::ChannelError;
+pub use exchange::{Exchange, Inboxes};
+pub use port::{Port, Sender};

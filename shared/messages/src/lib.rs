@@ -26,5 +26,7 @@ pub use plant::{AmplifierCommand, PlantProbe, PlantSample, drive_status};
 pub use telemetry::Telemetry;
 pub use vme::Ns;
 
+/// Version of everything in this crate; channels of different versions never meet.
+pub const PROTOCOL: u32 = 1;
 /// Number of joints of the arm.
 pub const JOINTS: usize = 7;

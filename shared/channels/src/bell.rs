@@ -1,0 +1,154 @@
+//! Bells: one counter per process in a page of shared memory, and a futex to sleep on.
+//!
+//! A waiter first yields the processor a few times, since the ringer usually runs on it next, then blocks. On a
+//! machine with busy hogs a yield lasts a whole time slice: when one took over [`YIELD_LIMIT`], the next
+//! [`BLOCK_AT_ONCE`] waits block at once. The choice comes from the benchmark `bells` of this crate.
+
+use crate::ChannelError;
+use memmap2::MmapMut;
+use rustix::thread::futex;
+use std::fs::OpenOptions;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// A longer yield means that somebody else had the processor.
+const YIELD_LIMIT: Duration = Duration::from_micros(50);
+/// Waits that block at once after such a yield.
+const BLOCK_AT_ONCE: u32 = 1000;
+/// Yields before blocking.
+const YIELDS: u32 = 20;
+/// Bytes between two bells: a cache line pair each.
+const STRIDE: usize = 128;
+
+/// The page of all bells of a run.
+#[derive(Clone)]
+pub struct Bells {
+    page: Arc<MmapMut>,
+}
+
+/// One process's bell, as its owner holds it.
+pub struct Bell {
+    bells: Bells,
+    index: usize,
+    heard: u32,
+    block_at_once: u32,
+}
+
+impl Bells {
+    /// Maps the page at `path` with room for `count` bells, creating it where it does not exist.
+    pub fn open(path: &Path, count: usize) -> Result<Bells, ChannelError> {
+        let failed = |error: std::io::Error| ChannelError::Bell { path: path.display().to_string(), reason: error.to_string() };
+        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        file.set_len((count * STRIDE) as u64).map_err(failed)?;
+        // SAFETY: the file belongs to this run alone, has just been sized and is never shrunk while a process maps it;
+        // it is only accessed through atomics.
+        #[allow(unsafe_code)]
+        let page = unsafe { MmapMut::map_mut(&file) }.map_err(failed)?;
+        Ok(Bells { page: Arc::new(page) })
+    }
+
+    fn word(&self, index: usize, word: usize) -> &AtomicU32 {
+        let offset = index * STRIDE + word * 4;
+        let bytes = &self.page[offset..offset + 4];
+        // SAFETY: four bytes inside the page, aligned (offset is a multiple of 4, the page of 4096), valid for the borrow
+        // of `self`, and used by every process as an atomic only.
+        #[allow(unsafe_code)]
+        unsafe {
+            &*bytes.as_ptr().cast::<AtomicU32>()
+        }
+    }
+
+    /// Rings the bell of process `index`.
+    pub fn ring(&self, index: usize) {
+        let counter = self.word(index, 0);
+        counter.fetch_add(1, Ordering::SeqCst);
+        if self.word(index, 1).load(Ordering::SeqCst) != 0 {
+            // a failed wake only means that nobody sleeps
+            let _ = futex::wake(counter, futex::Flags::empty(), i32::MAX as u32);
+        }
+    }
+
+    /// The bell of process `index`, for its owner.
+    pub fn bell(&self, index: usize) -> Bell {
+        Bell { bells: self.clone(), index, heard: 0, block_at_once: 0 }
+    }
+}
+
+impl Bell {
+    /// Waits until the bell has rung since the last wait, at most `limit`. True where it has.
+    pub fn wait(&mut self, limit: Duration) -> bool {
+        if self.rung() {
+            return true;
+        }
+        if self.block_at_once == 0 {
+            for _ in 0..YIELDS {
+                let before = Instant::now();
+                std::thread::yield_now();
+                if self.rung() {
+                    return true;
+                }
+                if before.elapsed() > YIELD_LIMIT {
+                    self.block_at_once = BLOCK_AT_ONCE;
+                    break;
+                }
+            }
+        } else {
+            self.block_at_once -= 1;
+        }
+        self.block(limit)
+    }
+
+    fn block(&mut self, limit: Duration) -> bool {
+        let (counter, sleeping) = (self.bells.word(self.index, 0), self.bells.word(self.index, 1));
+        let timeout = rustix::thread::futex::Timespec {
+            tv_sec: limit.as_secs() as _,
+            tv_nsec: limit.subsec_nanos().into(),
+        };
+        sleeping.store(1, Ordering::SeqCst);
+        // returns at once where the counter has moved; a spurious end is the caller's next wait
+        let _ = futex::wait(counter, futex::Flags::empty(), self.heard, Some(&timeout));
+        sleeping.store(0, Ordering::SeqCst);
+        self.rung()
+    }
+
+    fn rung(&mut self) -> bool {
+        let count = self.bells.word(self.index, 0).load(Ordering::SeqCst);
+        let rung = count != self.heard;
+        self.heard = count;
+        rung
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_before_the_wait_is_heard_and_a_silent_bell_times_out() {
+        let folder = tempfile::tempdir().expect("folder");
+        let bells = Bells::open(&folder.path().join("bells"), 2).expect("page");
+        let mut bell = bells.bell(1);
+        bells.ring(1);
+        assert!(bell.wait(Duration::ZERO));
+        assert!(!bell.wait(Duration::from_millis(1)));
+        bells.ring(0);
+        assert!(!bell.wait(Duration::from_millis(1)));
+    }
+
+    #[test]
+    fn a_ring_from_another_mapping_wakes_a_sleeper() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("bells");
+        let mut bell = Bells::open(&path, 2).expect("page").bell(0);
+        let other = Bells::open(&path, 2).expect("page");
+        let ringer = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(20));
+            other.ring(0);
+        });
+        // a long limit: the test's own watchdog, not a promise
+        assert!(bell.wait(Duration::from_secs(30)));
+        ringer.join().expect("ringer");
+    }
+}

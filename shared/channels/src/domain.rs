@@ -1,0 +1,54 @@
+//! One iceoryx2 domain per run.
+
+use crate::ChannelError;
+use iceoryx2::prelude::*;
+use std::path::{Path as StdPath, PathBuf};
+
+/// Folder of the shared-memory files.
+const SHARED_MEMORY: &str = "/dev/shm";
+
+/// The iceoryx2 node of one process in the domain of its run.
+#[derive(Debug)]
+pub struct Domain {
+    pub(crate) node: Node<ipc::Service>,
+    pub(crate) protocol: u32,
+}
+
+impl Domain {
+    /// Joins the domain that belongs to a run folder. `prefix` is unique to the run; the folder's path must be short
+    /// (sockets fail near 73 characters).
+    pub fn join(folder: &StdPath, prefix: &str, process: &str) -> Result<Domain, ChannelError> {
+        let setup = |operation, reason: String| ChannelError::Setup { channel: process.to_owned(), operation, reason };
+        // never the global configuration: it reads files in the working directory
+        let mut config = Config::default();
+        let root = folder.join("iox2");
+        config.global.prefix =
+            FileName::new(prefix.as_bytes()).map_err(|error| setup("naming the domain", format!("{error:?}")))?;
+        let root = Path::new(root.as_os_str().as_encoded_bytes())
+            .map_err(|error| setup("placing the domain", format!("{}: {error:?}", root.display())))?;
+        config.global.set_root_path(&root);
+        // while a run lives only the chassis cleans, and it removes the whole domain
+        config.global.node.cleanup_dead_nodes_on_creation = false;
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
+        config.global.service.cleanup_dead_nodes_on_open = false;
+        let name = NodeName::new(process).map_err(|error| setup("naming the node", format!("{error:?}")))?;
+        let node = NodeBuilder::new()
+            .name(&name)
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .map_err(|error| setup("creating the node", format!("{error:?}")))?;
+        Ok(Domain { node, protocol: messages::PROTOCOL })
+    }
+}
+
+/// Removes what is left in shared memory of the run with this prefix; names what could not be removed.
+pub fn remove_leftovers(prefix: &str) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(SHARED_MEMORY) else { return Vec::new() };
+    entries
+        .flatten()
+        .filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix))
+        .map(|entry| entry.path())
+        .filter(|path| std::fs::remove_file(path).is_err() && path.exists())
+        .collect()
+}

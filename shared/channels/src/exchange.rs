@@ -1,0 +1,258 @@
+//! The mail of one process: what its boards send goes to the boards beside them and to other processes.
+
+use crate::{ChannelError, Domain, Port, Sender};
+use board::routes::{ROUTES, Route};
+use board::{BoardId, Mail};
+use messages::*;
+use std::fmt::Debug;
+
+/// Mail that waits for each board, by [`BoardId`] number.
+pub type Inboxes = [Mail; BOARDS.len()];
+
+/// Messages that a reader may leave unread: the recorder lags by up to 64 windows, masters by the windows between two decisions.
+const BUFFER: usize = 160;
+/// Elements of a message that is allocated beforehand; longer ones allocate once.
+const LENGTH: usize = 64;
+
+/// All channels of one process.
+#[derive(Default)]
+pub struct Exchange {
+    local: Vec<(Route, Vec<BoardId>)>,
+    outlets: Vec<(BoardId, Box<dyn Outlet>)>,
+    inlets: Vec<Box<dyn Inlet>>,
+}
+
+trait Outlet {
+    fn send(&mut self, mail: &Mail) -> Result<(), ChannelError>;
+    /// The reader in that process is gone for good.
+    fn forget(&mut self, board: BoardId);
+}
+
+trait Inlet {
+    fn readers(&self) -> &[BoardId];
+    fn receive(&mut self, inboxes: &mut Inboxes) -> Result<(), ChannelError>;
+}
+
+/// A kind of payload: where it lies in a [`Mail`].
+trait Payload: bytemuck::Pod + Debug {
+    fn of(mail: &Mail) -> &[Self];
+    fn of_mut(mail: &mut Mail) -> &mut Vec<Self>;
+    fn newest(&self) -> u64;
+}
+
+macro_rules! payloads {
+    ($($kind:ident $payload:ident $field:ident $time:ident;)*) => {
+        $(impl Payload for $payload {
+            fn of(mail: &Mail) -> &[Self] { &mail.$field }
+            fn of_mut(mail: &mut Mail) -> &mut Vec<Self> { &mut mail.$field }
+            fn newest(&self) -> u64 { self.$time }
+        })*
+
+        fn open_outlet(kind: Kind, domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize) -> Result<Box<dyn Outlet>, ChannelError> {
+            Ok(match kind { $(Kind::$kind => Box::new(TypedOutlet::<$payload>::open(domain, name, readers, processes)?),)* })
+        }
+
+        fn open_inlet(kind: Kind, domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize) -> Result<Box<dyn Inlet>, ChannelError> {
+            Ok(match kind { $(Kind::$kind => Box::new(TypedInlet::<$payload>::open(domain, name, readers, processes)?),)* })
+        }
+
+        fn copy(kind: Kind, from: &Mail, to: &mut Mail) {
+            match kind { $(Kind::$kind => to.$field.extend_from_slice(&from.$field),)* }
+        }
+    };
+}
+
+payloads! {
+    Amplifier AmplifierCommand amplifier t;
+    Plant PlantSample plant t;
+    Words BusWord words t;
+    Commands Command commands start;
+    Telemetry Telemetry telemetry t;
+    PlantProbe PlantProbe plant_probe t;
+    ControlProbe ControlProbe control_probe t;
+    Events Event events t;
+    Transfers TransferRecord transfers data_at;
+}
+
+struct TypedOutlet<T: Payload> {
+    sender: Sender<T, Header>,
+    seq: u32,
+    readers: Vec<BoardId>,
+}
+
+impl<T: Payload> TypedOutlet<T> {
+    fn open(domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize) -> Result<Self, ChannelError> {
+        Ok(TypedOutlet { sender: Sender::open(domain, name, processes, BUFFER, LENGTH)?, seq: 0, readers })
+    }
+}
+
+impl<T: Payload> Outlet for TypedOutlet<T> {
+    fn send(&mut self, mail: &Mail) -> Result<(), ChannelError> {
+        for payload in T::of(mail).chunks(LENGTH) {
+            let t = payload.last().map_or(0, Payload::newest);
+            self.sender.send(&Header { t, seq: self.seq, crc: 0, wall_ns: 0 }, payload)?;
+            self.seq = self.seq.wrapping_add(1);
+        }
+        Ok(())
+    }
+
+    fn forget(&mut self, board: BoardId) {
+        if let Some(i) = self.readers.iter().position(|reader| *reader == board) {
+            self.readers.remove(i);
+            self.sender.expect_readers(self.readers.len());
+        }
+    }
+}
+
+struct TypedInlet<T: Payload> {
+    port: Port<T, Header>,
+    expected: u32,
+    readers: Vec<BoardId>,
+}
+
+impl<T: Payload> TypedInlet<T> {
+    fn open(domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize) -> Result<Self, ChannelError> {
+        Ok(TypedInlet { port: Port::open(domain, name, processes, BUFFER)?, expected: 0, readers })
+    }
+}
+
+impl<T: Payload> Inlet for TypedInlet<T> {
+    fn readers(&self) -> &[BoardId] {
+        &self.readers
+    }
+
+    fn receive(&mut self, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
+        let Self { port, expected, readers } = self;
+        let mut gap = None;
+        while port.receive(|header, payload| {
+            if header.seq != *expected {
+                gap = Some((*expected, header.seq));
+            }
+            *expected = header.seq.wrapping_add(1);
+            let (first, others) = readers.split_at(1);
+            let inbox = T::of_mut(&mut inboxes[first[0] as usize]);
+            let start = inbox.len();
+            inbox.extend(payload);
+            for other in others {
+                let (from, to) = two(inboxes, first[0] as usize, *other as usize);
+                T::of_mut(to).extend_from_slice(&T::of(from)[start..]);
+            }
+        })? {}
+        match gap {
+            Some((expected, found)) => Err(ChannelError::Lost { channel: port.name().to_owned(), expected, found }),
+            None => Ok(()),
+        }
+    }
+}
+
+fn two(inboxes: &mut Inboxes, a: usize, b: usize) -> (&Mail, &mut Mail) {
+    if a < b {
+        let (left, right) = inboxes.split_at_mut(b);
+        (&left[a], &mut right[0])
+    } else {
+        let (left, right) = inboxes.split_at_mut(a);
+        (&right[0], &mut left[b])
+    }
+}
+
+impl Exchange {
+    /// The channels of a process that hosts the boards `here`; `process_of` gives every board's process by number.
+    /// Without a domain every board must be here.
+    pub fn open(
+        here: &[BoardId],
+        domain: Option<&Domain>,
+        process_of: impl Fn(BoardId) -> usize,
+    ) -> Result<Exchange, ChannelError> {
+        let mut exchange = Exchange::default();
+        for route in ROUTES {
+            let readers: Vec<BoardId> = route.to.iter().copied().filter(|reader| here.contains(reader)).collect();
+            let away: Vec<BoardId> = route.to.iter().copied().filter(|reader| process_of(*reader) != process_of(route.from)).collect();
+            let mut processes: Vec<usize> = away.iter().map(|reader| process_of(*reader)).collect();
+            processes.sort_unstable();
+            processes.dedup();
+            let name = format!("{}/{:?}", route.from.name(), route.kind).to_lowercase();
+            if here.contains(&route.from) {
+                if let (Some(domain), false) = (domain, processes.is_empty()) {
+                    // one reader board stands for each process
+                    let mut ends = away.clone();
+                    ends.dedup_by_key(|board| process_of(*board));
+                    exchange.outlets.push((route.from, open_outlet(route.kind, domain, &name, ends, processes.len())?));
+                }
+                if !readers.is_empty() {
+                    exchange.local.push((*route, readers));
+                }
+            } else if let (Some(domain), false) = (domain, readers.is_empty()) {
+                exchange.inlets.push(open_inlet(route.kind, domain, &name, readers, processes.len())?);
+            }
+        }
+        Ok(exchange)
+    }
+
+    /// Carries what `from` sent to the boards beside it and to other processes.
+    pub fn deliver(&mut self, from: BoardId, mail: &Mail, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
+        for (route, readers) in self.local.iter().filter(|(route, _)| route.from == from) {
+            for reader in readers {
+                copy(route.kind, mail, &mut inboxes[*reader as usize]);
+            }
+        }
+        self.outlets.iter_mut().filter(|(sender, _)| *sender == from).try_for_each(|(_, outlet)| outlet.send(mail))
+    }
+
+    /// Takes in what other processes sent to `to`.
+    pub fn fetch(&mut self, to: BoardId, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
+        self.inlets.iter_mut().filter(|inlet| inlet.readers().contains(&to)).try_for_each(|inlet| inlet.receive(inboxes))
+    }
+
+    /// The process of `board` is gone for good: messages need not reach it any more.
+    pub fn forget(&mut self, board: BoardId) {
+        self.outlets.iter_mut().for_each(|(_, outlet)| outlet.forget(board));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use board::BoardId::*;
+
+    fn mail_with_command() -> Mail {
+        let mut mail = Mail::default();
+        mail.amplifier.push(AmplifierCommand { t: 7, volts: [1.5; JOINTS], enabled: 127, brake_released: 127 });
+        mail
+    }
+
+    #[test]
+    fn boards_in_one_process_need_no_domain() {
+        let mut exchange = Exchange::open(&BOARDS, None, |_| 0).expect("local");
+        let mut inboxes = Inboxes::default();
+        exchange.deliver(DaIo, &mail_with_command(), &mut inboxes).expect("deliver");
+        assert_eq!(inboxes[HwSim as usize].amplifier, mail_with_command().amplifier);
+        assert!(inboxes[EncoderIf as usize].amplifier.is_empty());
+    }
+
+    #[test]
+    fn the_same_mail_arrives_over_shared_memory_and_inside_a_process() {
+        let folder = tempfile::tempdir().expect("folder");
+        let prefix = format!("t{}x_", std::process::id());
+        let process_of = |board: BoardId| usize::from(board == DaIo || board == EncoderIf);
+        {
+            let domain = Domain::join(folder.path(), &prefix, "a").expect("domain");
+            let other = Domain::join(folder.path(), &prefix, "b").expect("domain");
+            let mut a = Exchange::open(&[DaIo, EncoderIf], Some(&domain), process_of).expect("open");
+            let here: Vec<BoardId> = BOARDS.into_iter().filter(|board| process_of(*board) == 0).collect();
+            let mut b = Exchange::open(&here, Some(&other), process_of).expect("open");
+            let (mut at_a, mut at_b) = (Inboxes::default(), Inboxes::default());
+            a.deliver(DaIo, &mail_with_command(), &mut at_a).expect("deliver");
+            b.fetch(HwSim, &mut at_b).expect("fetch");
+            assert_eq!(at_b[HwSim as usize].amplifier, mail_with_command().amplifier);
+            let mut mail = Mail::default();
+            // one message more than fits a sample's preallocated length
+            mail.plant.resize(LENGTH + 1, bytemuck::Zeroable::zeroed());
+            b.deliver(HwSim, &mail, &mut at_b).expect("deliver");
+            a.fetch(EncoderIf, &mut at_a).expect("fetch");
+            assert_eq!(at_a[EncoderIf as usize].plant.len(), LENGTH + 1);
+            assert_eq!(at_a[DaIo as usize].plant.len(), LENGTH + 1);
+            assert_eq!(at_b[ForceSensorIf as usize].plant.len(), LENGTH + 1);
+        }
+        assert!(crate::remove_leftovers(&prefix).is_empty());
+    }
+}

@@ -14,7 +14,7 @@
 
 // pub mod accounting;
 pub mod adaptor;
-// pub mod analysis;
+pub mod analysis;
 pub mod arbiter;
 pub mod check;
 pub mod cycle;

@@ -239,6 +239,10 @@ impl Timing {
         &self.wiring.rack
     }
 
+    pub(crate) fn wiring(&self) -> &Wiring {
+        &self.wiring
+    }
+
     /// What went wrong so far.
     pub fn counters(&self) -> Counters {
         self.counters

@@ -13,7 +13,7 @@ use crate::timer::Ticks;
 /// before what begins, then the processors choose among all that they could do, and at last the
 /// arbiter among all who ask.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Source {
+pub(crate) enum Source {
     Fault,
     Bus,
     Processor(u16),
@@ -27,14 +27,14 @@ pub(super) enum Source {
 
 /// A master on the bus.
 #[derive(Clone, Debug)]
-pub(super) struct Master {
+pub(crate) struct Master {
     pub name: String,
     pub place: Place,
     pub release: ReleasePolicy,
 }
 
 #[derive(Debug)]
-pub(super) struct IrqWire {
+pub(crate) struct IrqWire {
     /// Processor that handles it.
     pub handler: u16,
     pub slot: u8,
@@ -45,7 +45,7 @@ pub(super) struct IrqWire {
 }
 
 #[derive(Debug)]
-pub(super) struct Wiring {
+pub(crate) struct Wiring {
     pub rack: Rack,
     pub masters: Vec<Master>,
     /// Master in each slot.

@@ -1,0 +1,307 @@
+//! The plant on the rack's time: steps on a fixed grid, actuation at its exact instants, samples for the wires.
+//!
+//! The committed state moves only to points of the grid and to instants of amplifier commands. What is asked for at any
+//! other instant (the end of a window) is found by a trial step that is thrown away, so the motion does not depend on where
+//! windows are cut. A closing limit switch or a tripping amplifier ends the window there. A runaway freezes the arm: the
+//! last good values are repeated with [`drive_status::DIVERGED`] set.
+
+use crate::energy;
+use crate::integrate;
+use crate::plant::{Actuation, Evaluation, Plant};
+use crate::state::State;
+use arm::{DOF, JointVector, Pose, rotation};
+use board::{Board, Inputs, Outputs};
+use messages::{
+    AmplifierCommand, Event, EventKind, Ns, PlantProbe, PlantSample, Severity, drive_status,
+};
+use nalgebra::Vector3;
+use scenario::{Integrator, Scenario};
+
+/// Most amplifier commands that may wait for their time.
+const PENDING: usize = 256;
+
+/// The hardware of the rack.
+pub struct HwSim {
+    plant: Plant,
+    task_frame: Pose,
+    integrator: Integrator,
+    /// Distance of the grid's points, ns.
+    grid: Ns,
+    runaway: f64,
+    /// Instant of `state`.
+    t: Ns,
+    state: State,
+    actuation: Actuation,
+    /// Forces in `state` under `actuation`, once they are known.
+    now: Option<Evaluation>,
+    /// Commands whose time has not come.
+    pending: Vec<AmplifierCommand>,
+    status: u32,
+    touched: bool,
+    last_sample: PlantSample,
+    last_probe: PlantProbe,
+}
+
+impl HwSim {
+    /// The hardware of a scenario, at rest on its brakes. The message says what cannot be simulated.
+    pub fn new(scenario: &Scenario) -> Result<HwSim, String> {
+        let (plant, state) = Plant::new(scenario)?;
+        let mut sim = HwSim {
+            plant,
+            task_frame: scenario.task_frame(),
+            integrator: scenario.plant.integrator,
+            grid: scenario::nanoseconds(1.0 / scenario.plant.rate_hz),
+            runaway: scenario.plant.runaway_rad_per_s,
+            t: 0,
+            state,
+            actuation: Actuation::SAFE,
+            now: None,
+            pending: Vec::with_capacity(PENDING),
+            status: 0,
+            touched: false,
+            last_sample: bytemuck::Zeroable::zeroed(),
+            last_probe: bytemuck::Zeroable::zeroed(),
+        };
+        sim.status = sim.switches();
+        Ok(sim)
+    }
+
+    /// True state at the last committed instant.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Forces in the committed state.
+    fn now(&mut self) -> Evaluation {
+        *self
+            .now
+            .get_or_insert_with(|| self.plant.evaluate(&self.state, &self.actuation))
+    }
+
+    /// Limit switches, emergency chain and brake contacts in the committed state. The switches sit in the chain.
+    fn switches(&self) -> u32 {
+        let (lower, upper) = (self.plant.arm.lower_limits(), self.plant.arm.upper_limits());
+        let mut status = self.actuation.braked << 16;
+        for i in 0..DOF {
+            if self.state.q[i] < lower[i] || self.state.q[i] > upper[i] {
+                status |= (1 << (8 + i)) | drive_status::EMERGENCY_STOP;
+            }
+        }
+        status
+    }
+
+    /// Applies the commands whose time has come.
+    fn actuate(&mut self) {
+        let due = self
+            .pending
+            .iter()
+            .take_while(|command| command.t <= self.t)
+            .count();
+        if let Some(last) = self.pending[..due].last() {
+            let before = self.actuation;
+            self.actuation = Actuation::from_command(last);
+            for i in 0..DOF {
+                // an engaging brake starts without deflection
+                if before.braked & !self.actuation.braked & (1 << i) != 0 {
+                    self.state.brake[i] = 0.0;
+                }
+            }
+            if self.actuation != before {
+                self.now = None;
+                self.status = self.switches();
+            }
+        }
+        self.pending.drain(..due);
+    }
+
+    /// Carries the committed state to `t`. False where it leaves its domain; then it stays.
+    fn commit(&mut self, t: Ns, out: &mut Outputs) -> bool {
+        let now = self.now();
+        let before = self.state;
+        integrate::step(
+            &self.plant,
+            self.integrator,
+            &mut self.state,
+            &now,
+            &self.actuation,
+            seconds(t - self.t),
+        );
+        self.t = t;
+        self.now = None;
+        if let Some((joint, value)) = self.state.out_of_domain(self.runaway) {
+            self.state = before;
+            self.status |= drive_status::DIVERGED;
+            let value = if value.is_finite() { value } else { f64::MAX };
+            out.mail.events.push(Event::new(
+                t,
+                EventKind::Diverged,
+                Severity::Error,
+                joint as f64,
+                value,
+            ));
+            return false;
+        }
+        self.status = self.switches();
+        true
+    }
+
+    /// Puts the committed state on the wires.
+    fn sample(&mut self, out: &mut Outputs) {
+        let now = self.now();
+        if !self.touched && now.touch.penetration > 0.0 {
+            self.touched = true;
+            out.mail.events.push(Event::new(
+                self.t,
+                EventKind::FirstContact,
+                Severity::Ok,
+                now.touch.normal_speed,
+                0.0,
+            ));
+        }
+        self.last_sample = self.sample_of(self.t, &self.state, &now);
+        out.mail.plant.push(self.last_sample);
+    }
+
+    fn sample_of(&self, t: Ns, state: &State, now: &Evaluation) -> PlantSample {
+        let shaft =
+            |v: &JointVector| std::array::from_fn(|i| v[i] * self.plant.drives[i].gear_ratio);
+        PlantSample {
+            t,
+            wrench: self.plant.sensor.wrench(now),
+            theta: shaft(&state.theta),
+            theta_dot: shaft(&state.theta_dot),
+            status: self.status,
+            reserved: 0,
+        }
+    }
+
+    fn probe_of(&self, t: Ns, state: &State, now: &Evaluation) -> PlantProbe {
+        let frame = &self.task_frame;
+        let in_task = |v: Vector3<f64>| frame.r.tr_mul(&v);
+        let position = in_task(now.pose.p - frame.p);
+        let q = rotation::quaternion(&(frame.r.transpose() * now.pose.r));
+        let sign = if q[3] < 0.0 { -1.0 } else { 1.0 };
+        let wrench = &now.touch.wrench;
+        let force = in_task(Vector3::new(wrench[0], wrench[1], wrench[2]));
+        let moment = in_task(Vector3::new(wrench[3], wrench[4], wrench[5]));
+        PlantProbe {
+            t,
+            q: state.q.into(),
+            qd: state.qd.into(),
+            theta: state.theta.into(),
+            theta_dot: state.theta_dot.into(),
+            motor_torque: now.motor.into(),
+            spring_torque: now.transmitted.into(),
+            friction_torque: std::array::from_fn(|i| now.loss[i].friction),
+            position: position.into(),
+            orientation: [q[3] * sign, q[0] * sign, q[1] * sign, q[2] * sign],
+            contact: [force.x, force.y, force.z, moment.x, moment.y, moment.z],
+            // nothing to touch is a gap too wide to matter, but a finite number
+            penetration: now.touch.penetration.max(-1e3),
+            energy: energy::mechanical(&self.plant, state),
+            status: self.status,
+            reserved: 0,
+        }
+    }
+
+    /// Probe, and where the committed state is older, sample, at the end of the window.
+    fn finish_window(&mut self, until: Ns, out: &mut Outputs) {
+        let mut state = self.state;
+        let mut now = self.now();
+        if self.t < until {
+            let h = seconds(until - self.t);
+            integrate::step(
+                &self.plant,
+                self.integrator,
+                &mut state,
+                &now,
+                &self.actuation,
+                h,
+            );
+            now = self.plant.evaluate(&state, &self.actuation);
+            if state.out_of_domain(self.runaway).is_some() {
+                // the next step of the grid will find it too and say so
+                return self.repeat(until, out);
+            }
+            if self.last_sample.t < until {
+                self.last_sample = self.sample_of(until, &state, &now);
+                out.mail.plant.push(self.last_sample);
+            }
+        }
+        self.last_probe = self.probe_of(until, &state, &now);
+        out.mail.plant_probe.push(self.last_probe);
+    }
+
+    /// Stands still, for good.
+    fn freeze(&mut self, until: Ns, out: &mut Outputs) {
+        self.t = until;
+        self.repeat(until, out);
+    }
+
+    /// Repeats the last good values.
+    fn repeat(&mut self, until: Ns, out: &mut Outputs) {
+        self.last_sample.status = self.status;
+        self.last_probe.status = self.status;
+        if self.last_sample.t < until {
+            self.last_sample.t = until;
+            out.mail.plant.push(self.last_sample);
+        }
+        self.last_probe.t = until;
+        out.mail.plant_probe.push(self.last_probe);
+    }
+}
+
+impl Board for HwSim {
+    fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
+        self.pending.extend_from_slice(&inputs.mail.amplifier);
+        if inputs.boot {
+            self.actuate();
+            self.sample(out);
+            self.finish_window(inputs.until, out);
+            return;
+        }
+        out.mail.plant.push(PlantSample {
+            t: inputs.from,
+            status: self.status,
+            ..self.last_sample
+        });
+        if self.status & drive_status::DIVERGED != 0 {
+            return self.freeze(inputs.until, out);
+        }
+        loop {
+            self.actuate();
+            let command = self.pending.first().map_or(Ns::MAX, |command| command.t);
+            let grid = (self.t / self.grid + 1) * self.grid;
+            let next = grid.min(command);
+            if next > inputs.until || next == inputs.until && command == next && grid != next {
+                break;
+            }
+            let switches = self.status;
+            if !self.commit(next, out) {
+                return self.freeze(inputs.until, out);
+            }
+            let closed = self.status
+                & !switches
+                & (drive_status::LIMIT_SWITCH | drive_status::AMPLIFIER_TRIPPED)
+                != 0;
+            if next == grid || closed {
+                self.sample(out);
+            }
+            if closed && next < inputs.until {
+                // what was to come is said again, knowing of this
+                self.pending.clear();
+                self.finish_window(next, out);
+                out.early = Some(next);
+                return;
+            }
+            if next == inputs.until {
+                break;
+            }
+        }
+        self.finish_window(inputs.until, out);
+    }
+}
+
+fn seconds(ns: Ns) -> f64 {
+    ns as f64 * 1e-9
+}

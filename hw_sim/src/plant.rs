@@ -1,0 +1,238 @@
+//! Arm, drives, contacts and sensor as one differential equation.
+//!
+//! Flexible joints (Spong), in output-side quantities: M(q)q̈ + h = τ_s + Jᵀ(−F_e) on the link side and
+//! N²J_m (θ̈/N) = τ_m − τ_f − τ_brake − τ_s on the motor side. Rigid joints: (M + N²J_m)q̈ + h = τ_m − τ_f − τ_brake − JᵀF_e.
+
+use crate::contact::{Contact, Plane, Touch};
+use crate::drive::{Drive, RotorLoss, Transmission};
+use crate::sensor::Sensor;
+use crate::state::{CONTACT_POINTS, State};
+use arm::{ArmModel, ArmState, DOF, JointVector, Pose, Spatial};
+use messages::AmplifierCommand;
+use scenario::{Joints, Scenario};
+
+/// What does not change while the arm moves.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    /// The arm as it is (not as the controller knows it).
+    pub arm: ArmModel,
+    /// One drive per joint.
+    pub drives: [Drive; DOF],
+    /// Flexible or rigid transmissions.
+    pub joints: Joints,
+    /// What the tool may touch.
+    pub contacts: Vec<Contact>,
+    /// Strain gauges between flange and tool.
+    pub sensor: Sensor,
+}
+
+/// What the amplifiers and brakes are told.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Actuation {
+    /// Amplifier inputs, V; 0 where the amplifier is disabled.
+    pub volts: [f64; DOF],
+    /// Bit i: brake of joint i engaged.
+    pub braked: u32,
+}
+
+impl Actuation {
+    /// Torque off, brakes engaged.
+    pub const SAFE: Actuation = Actuation {
+        volts: [0.0; DOF],
+        braked: 0x7F,
+    };
+
+    /// What a command of the D/A and parallel I/O cards means.
+    pub fn from_command(command: &AmplifierCommand) -> Actuation {
+        let enabled = |i: usize| command.enabled & (1 << i) != 0;
+        Actuation {
+            volts: std::array::from_fn(|i| if enabled(i) { command.volts[i] } else { 0.0 }),
+            braked: !command.brake_released & 0x7F,
+        }
+    }
+}
+
+/// Forces and accelerations in one state.
+#[derive(Clone, Copy, Debug)]
+pub struct Evaluation {
+    /// Link accelerations, rad/s².
+    pub qdd: JointVector,
+    /// Motor accelerations over N, rad/s².
+    pub theta_ddot: JointVector,
+    /// Motor torques, Nm.
+    pub motor: JointVector,
+    /// Friction and brakes.
+    pub loss: [RotorLoss; DOF],
+    /// Torques through the transmissions, Nm.
+    pub transmitted: JointVector,
+    /// Pose of the tool.
+    pub pose: Pose,
+    /// Twist of the tool, base axes.
+    pub twist: Spatial,
+    /// Acceleration of the tool, base axes.
+    pub acceleration: Spatial,
+    /// Contact.
+    pub touch: Touch,
+}
+
+impl Plant {
+    /// The plant of a scenario, with its start posture. The message says what cannot be simulated.
+    pub fn new(scenario: &Scenario) -> Result<(Plant, State), String> {
+        let arm = scenario.plant_arm()?;
+        let data = scenario.drives()?;
+        let q = scenario.initial_posture()?;
+        let plant = &scenario.plant;
+        let rotors = data.each(|drive| drive.rotor_inertia_at_output_kg_m2);
+        let braked = match plant.joints {
+            Joints::Flexible => rotors,
+            Joints::Rigid => rotors + felt_inertia(&arm, &q)?,
+        };
+        let contacts: Vec<Contact> = scenario
+            .surfaces
+            .iter()
+            .map(|surface| Contact::Plane(Plane::from_surface(scenario, surface)))
+            .collect();
+        let points: usize = contacts.iter().map(Contact::points).sum();
+        if points > CONTACT_POINTS {
+            return Err(format!(
+                "the surfaces have {points} contact points, expected at most {CONTACT_POINTS}"
+            ));
+        }
+        let plant = Plant {
+            drives: std::array::from_fn(|i| {
+                Drive::new(
+                    &data.joints[i],
+                    plant.friction_scale,
+                    plant.kinematic_error,
+                    braked[i],
+                )
+            }),
+            joints: plant.joints,
+            contacts,
+            sensor: Sensor::new(&scenario.arm, &arm),
+            arm,
+        };
+        let state = plant.braked_at_rest(q);
+        Ok((plant, state))
+    }
+
+    /// At rest with every brake engaged and carrying the arm's weight: nothing moves when time starts.
+    pub fn braked_at_rest(&self, q: JointVector) -> State {
+        let mut state = State::at_rest(q);
+        let arm = ArmState::new(&self.arm, &q, &JointVector::zeros());
+        let touch = self.touch(&arm.pose(), &Spatial::zeros(), &state);
+        state.load = arm.bias() + arm.jacobian().tr_mul(&touch.wrench);
+        for (i, drive) in self.drives.iter().enumerate() {
+            let torque = state.load[i];
+            let mut on_rotor = torque;
+            if self.joints == Joints::Flexible {
+                state.theta[i] = drive.motor_angle_under(torque, q[i]);
+                on_rotor = drive.transmission(state.theta[i], 0.0, q[i], 0.0).on_rotor;
+            }
+            state.brake[i] = drive.brake_deflection_under(-on_rotor);
+        }
+        state
+    }
+
+    /// Forces and accelerations in `state` under `actuation`.
+    pub fn evaluate(&self, state: &State, actuation: &Actuation) -> Evaluation {
+        let arm = ArmState::new(&self.arm, &state.q, &state.qd);
+        let tip = arm.tip_motion();
+        let touch = self.touch(&tip.pose, &tip.twist, state);
+        let f_tip = -touch.wrench;
+        let motor = JointVector::from_fn(|i, _| self.drives[i].motor_torque(actuation.volts[i]));
+        let mut loss = [RotorLoss::default(); DOF];
+        let mut theta_ddot = JointVector::zeros();
+        let mut transmitted = JointVector::zeros();
+        let braked = |i: usize| actuation.braked & (1 << i) != 0;
+        let qdd = match self.joints {
+            Joints::Flexible => {
+                for (i, drive) in self.drives.iter().enumerate() {
+                    let Transmission {
+                        on_link, on_rotor, ..
+                    } = drive.transmission(
+                        state.theta[i],
+                        state.theta_dot[i],
+                        state.q[i],
+                        state.qd[i],
+                    );
+                    loss[i] = drive.loss(
+                        state.presliding[i],
+                        state.brake[i],
+                        state.theta_dot[i],
+                        on_link,
+                        braked(i),
+                    );
+                    theta_ddot[i] =
+                        (motor[i] - loss[i].friction - loss[i].brake - on_rotor) / drive.rotor;
+                    transmitted[i] = on_link;
+                }
+                arm.aba(&transmitted, &JointVector::zeros(), &f_tip)
+            }
+            Joints::Rigid => {
+                let mut rotors = JointVector::zeros();
+                let mut driving = motor;
+                for (i, drive) in self.drives.iter().enumerate() {
+                    loss[i] = drive.loss(
+                        state.presliding[i],
+                        state.brake[i],
+                        state.qd[i],
+                        state.load[i],
+                        braked(i),
+                    );
+                    driving[i] -= loss[i].friction + loss[i].brake;
+                    rotors[i] = drive.rotor;
+                }
+                let qdd = arm.aba(&driving, &rotors, &f_tip);
+                theta_ddot = qdd;
+                transmitted = driving - rotors.component_mul(&qdd);
+                qdd
+            }
+        };
+        let acceleration = tip.jacobian * qdd + tip.jdot_qd;
+        Evaluation {
+            qdd,
+            theta_ddot,
+            motor,
+            loss,
+            transmitted,
+            pose: tip.pose,
+            twist: tip.twist,
+            acceleration,
+            touch,
+        }
+    }
+
+    fn touch(&self, pose: &Pose, twist: &Spatial, state: &State) -> Touch {
+        let mut touch = Touch::NONE;
+        let mut first = 0;
+        for contact in &self.contacts {
+            contact.add_to(
+                &mut touch,
+                pose,
+                twist,
+                &state.contact[first..first + contact.points()],
+            );
+            first += contact.points();
+        }
+        touch
+    }
+
+    /// Moves the contact bristles of `state` on by `h` seconds in which the tool, at `now`, has the twist `moving`.
+    pub fn advance_contacts(&self, state: &mut State, now: &Evaluation, moving: &Spatial, h: f64) {
+        let mut first = 0;
+        for contact in &self.contacts {
+            let bristles = &mut state.contact[first..first + contact.points()];
+            contact.advance(bristles, &now.pose, &now.twist, moving, h);
+            first += contact.points();
+        }
+    }
+}
+
+/// Inertia that a torque on one joint feels while the others are free, 1/(M⁻¹)_ii, kg m².
+fn felt_inertia(arm: &ArmModel, q: &JointVector) -> Result<JointVector, String> {
+    let inverse = arm::crba(arm, q)
+        .try_inverse()
+        .ok_or("the arm's mass matrix at the start posture is singular")?;
+    Ok(JointVector::from_fn(|i, _| 1.0 / inverse[(i, i)]))
+}

@@ -1,0 +1,173 @@
+//! The cards on the rack's time: register accesses, drive signals and timers in the order of their instants.
+//!
+//! A written word arrives ahead of its transfer and waits for it; a transfer that failed changes nothing, its word waits
+//! for the retry. A window that is run again starts from the copy made at its start.
+
+use crate::cards::{Addresses, Cards};
+use board::{Board, Inputs, Ns, Outputs};
+use messages::{AmplifierCommand, BusWord, TransferRecord};
+use scenario::Scenario;
+
+/// Words and signal changes that may wait without a new allocation.
+const PENDING: usize = 256;
+
+/// Two D/A cards and the parallel I/O card.
+pub struct DaIo {
+    addresses: Addresses,
+    state: State,
+    /// State at the start of the last window, with what had arrived by then.
+    saved: State,
+}
+
+#[derive(Debug)]
+struct State {
+    cards: Cards,
+    /// Written values whose transfer has not come.
+    words: Vec<BusWord>,
+    /// Changes of the drives' signals whose time has not come.
+    signals: Vec<(Ns, u32)>,
+    last_signal: u32,
+}
+
+impl State {
+    fn copy_from(&mut self, other: &State) {
+        self.cards = other.cards;
+        self.words.clone_from(&other.words);
+        self.signals.clone_from(&other.signals);
+        self.last_signal = other.last_signal;
+    }
+
+    fn absorb(&mut self, inputs: &Inputs) {
+        for word in &inputs.mail.words {
+            let same = |w: &BusWord| {
+                (w.task, w.job, w.index, w.addr) == (word.task, word.job, word.index, word.addr)
+            };
+            match self.words.iter_mut().find(|w| same(w)) {
+                Some(known) => *known = *word,
+                None => self.words.push(*word),
+            }
+        }
+        for sample in &inputs.mail.plant {
+            if sample.status != self.last_signal {
+                self.last_signal = sample.status;
+                self.signals.push((sample.t, sample.status));
+            }
+        }
+    }
+}
+
+impl DaIo {
+    /// The cards of a scenario, at power-up. The message says what is missing.
+    pub fn new(scenario: &Scenario) -> Result<DaIo, String> {
+        let cards = Cards::new(scenario)?;
+        let state = || State {
+            cards,
+            words: Vec::with_capacity(PENDING),
+            signals: Vec::with_capacity(PENDING),
+            last_signal: messages::drive_status::BRAKE_ENGAGED,
+        };
+        Ok(DaIo {
+            addresses: Addresses::new(scenario)?,
+            state: state(),
+            saved: state(),
+        })
+    }
+
+    fn transfer(&mut self, transfer: &TransferRecord, out: &mut Outputs) {
+        let TransferRecord {
+            task,
+            job,
+            index,
+            data_at,
+            ..
+        } = *transfer;
+        if !transfer.is_ok() {
+            return;
+        }
+        if transfer.is_read() {
+            let width = transfer.access().width.bytes();
+            for cycle in 0..transfer.n {
+                let addr = transfer.addr + cycle * width;
+                let value = self
+                    .addresses
+                    .register(addr)
+                    .map_or(u32::MAX, |register| self.state.cards.read(register));
+                out.mail.words.push(BusWord {
+                    t: data_at,
+                    addr,
+                    value,
+                    job,
+                    task,
+                    index,
+                });
+            }
+            return;
+        }
+        let state = &mut self.state;
+        for word in &state.words {
+            if (word.task, word.job, word.index) == (task, job, index)
+                && let Some(register) = self.addresses.register(word.addr)
+            {
+                state.cards.write(data_at, register, word.value);
+            }
+        }
+        // an earlier job's words will never be fetched
+        state
+            .words
+            .retain(|w| w.task != task || (w.job >= job && (w.job, w.index) != (job, index)));
+    }
+}
+
+impl Board for DaIo {
+    fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
+        if inputs.rerun {
+            self.state.copy_from(&self.saved);
+        }
+        self.state.absorb(inputs);
+        self.saved.copy_from(&self.state);
+        if inputs.boot {
+            out.mail.amplifier.push(self.state.cards.outputs(0));
+        }
+
+        let mut transfers = inputs.transfers.iter().peekable();
+        loop {
+            let signal = self
+                .state
+                .signals
+                .first()
+                .map_or(Ns::MAX, |signal| signal.0.max(inputs.from));
+            let transfer = transfers
+                .peek()
+                .map_or(Ns::MAX, |transfer| transfer.data_at);
+            let timer = self.state.cards.next_timer();
+            let t = signal.min(transfer).min(timer);
+            if t == Ns::MAX || transfer == Ns::MAX && t >= inputs.until {
+                break;
+            }
+            let before = self.state.cards.outputs(t);
+            // at one instant: a new signal first, then a transfer (a heartbeat just in time counts), then timers
+            if signal == t {
+                let (_, status) = self.state.signals.remove(0);
+                self.state.cards.signals(t, status, &mut out.mail.events);
+            } else if transfer == t {
+                if let Some(transfer) = transfers.next() {
+                    self.transfer(transfer, out);
+                }
+            } else {
+                self.state.cards.timer(t, &mut out.mail.events);
+            }
+            let after = self.state.cards.outputs(t);
+            if after != before {
+                push_merged(&mut out.mail.amplifier, after);
+            }
+        }
+    }
+}
+
+/// Outputs that change twice at one instant are one command.
+fn push_merged(commands: &mut Vec<AmplifierCommand>, command: AmplifierCommand) {
+    match commands.last_mut() {
+        Some(last) if last.t == command.t => *last = command,
+        _ => commands.push(command),
+    }
+}

@@ -1,1 +1,26 @@
-//! pacing
+//! Pacing: who acts when. Lock step (simulated time, as fast as the machine allows), across processes or inside one,
+//! and the life and death of the processes of a run.
+//!
+//! * [`Lockstep`] runs the windows: timing plane, then the boards in the order of the signal path.
+//! * [`Host`] steps the boards of one process; [`serve`] is the whole `main` of a board's process.
+//! * [`RunFolder`] and [`Power`]: what a run leaves on the machine, and how it goes away again.
+//!
+//! A peer that dies or stalls is a [`RunError`] within a bounded wall time; a wall-clock limit may only abort a run, never
+//! change a simulated value.
+
+#![warn(missing_docs)]
+
+mod error;
+mod host;
+mod lockstep;
+mod power;
+mod remote;
+mod run_folder;
+mod serve;
+
+pub use error::RunError;
+pub use host::{Answer, Factory, Host};
+pub use lockstep::{Flow, Lockstep, Observer};
+pub use power::Power;
+pub use run_folder::{Context, RunFolder, clean_stale};
+pub use serve::serve;

@@ -1,0 +1,462 @@
+//! Lock step: simulated time in windows, each from one decision point to the next.
+//!
+//! A window: the timing plane runs ahead to the next decision point D; da_io changes its outputs at the exact times of the
+//! writes made to it; the arm integrates to D with them (and may stop early: then the timing plane goes back and runs to
+//! that instant); force sensor and encoders answer the reads made to them at *their* times; the board that decides at D is
+//! stepped with the values read. The recorder gets the same grants one way, with credit.
+
+use crate::error::at;
+use crate::host::{Answer, Factory, Host};
+use crate::remote::{READY, Remote};
+use crate::serve::{CHASSIS_BELL, process_of};
+use crate::{Context, Power, RunError, RunFolder};
+use board::{BoardId, Mail, Ns, Op};
+use channels::{Bell, Bells, Domain, Exchange};
+use messages::{BOARDS, Grant, TransferRecord, flags};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use vme::{Stop, Timing, Transfer};
+
+/// Longest window: bounds what a board has to keep.
+const MAX_WINDOW: Ns = 10 * vme::MILLISECOND;
+/// Windows that the recorder may lag; then time waits.
+const RECORDER_CREDIT: u32 = 64;
+/// How often a wait looks whether everybody still lives.
+const WATCH_PERIOD: Duration = Duration::from_millis(50);
+/// No answer for this long and no sign of life: stalled.
+const STALL: Duration = Duration::from_secs(5);
+/// Processes get this long to report ready.
+const READY_LIMIT: Duration = Duration::from_secs(30);
+
+/// Whether the run goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// Next window.
+    Continue,
+    /// The run has come to its end.
+    Stop,
+}
+
+/// Sees every window of a run, in order.
+pub trait Observer {
+    /// Probes and events of the window's boards, and the bus transfers whose data moved in it.
+    fn window(&mut self, until: Ns, mail: &Mail, transfers: &[Transfer]) -> Flow;
+}
+
+/// A rack in lock step.
+pub struct Lockstep {
+    timing: Timing,
+    ahead: Timing,
+    host: Host,
+    remotes: Vec<Remote>,
+    /// Index in `remotes` of each board's process; `None` = here.
+    place: [Option<usize>; BOARDS.len()],
+    power: Power,
+    bells: Option<(Bells, Bell)>,
+    /// Rest of the jobs of each task, as its board last said.
+    rest: Vec<Vec<Op>>,
+    board_of_task: Vec<BoardId>,
+    board_of_slave: Vec<BoardId>,
+    transfers: Vec<Transfer>,
+    to_board: [Vec<TransferRecord>; BOARDS.len()],
+    own_mail: Mail,
+    window: u64,
+    recorder_owes: u32,
+    interrupted: &'static AtomicBool,
+    // last: it removes the folder once nobody uses it
+    _folder: Option<RunFolder>,
+}
+
+impl Lockstep {
+    /// Powers the rack up: starts the processes of the scenario (none if all its boards are in the chassis) and waits until
+    /// each is ready. `programs` finds the built-in program of a process.
+    pub fn power_up(
+        mut context: Context,
+        factory: Factory<'_>,
+        programs: &dyn Fn(&scenario::Process) -> Vec<String>,
+        interrupted: &'static AtomicBool,
+    ) -> Result<Lockstep, RunError> {
+        let scenario = context.scenario.clone();
+        let timing = Timing::new(scenario.rack.clone())?;
+        let place = BOARDS.map(|board| process_of(&scenario, board));
+        let away: Vec<usize> = (0..scenario.processes.len()).filter(|i| place.contains(&(i + 1))).collect();
+        let here: Vec<BoardId> = BOARDS.into_iter().filter(|board| place[*board as usize] == 0).collect();
+        let mut power = Power::default();
+        let mut remotes = Vec::new();
+        let (mut folder, mut domain, mut bells) = (None, None, None);
+        if !away.is_empty() {
+            let run_folder = RunFolder::create()?;
+            context.prefix = run_folder.prefix.clone();
+            run_folder.write_context(&context)?;
+            let joined = Domain::join(&run_folder.path, &run_folder.prefix, "chassis")?;
+            let page = Bells::open(&run_folder.path.join("bells"), scenario.processes.len() + 1)?;
+            for i in &away {
+                remotes.push(Remote::open(&joined, &scenario.processes[*i].name, i + 1)?);
+            }
+            bells = Some((page.clone(), page.bell(CHASSIS_BELL)));
+            domain = Some(joined);
+            folder = Some(run_folder);
+        }
+        let exchange = Exchange::open(&here, domain.as_ref(), |board| place[board as usize])?;
+        let host = Host::new(&here, exchange, &context, factory)?;
+        if let Some(folder) = &folder {
+            for i in &away {
+                let process = &scenario.processes[*i];
+                power.spawn(&process.name, &programs(process), &folder.path)?;
+            }
+        }
+        let board_named = |name: &str| BoardId::from_name(name).unwrap_or(BoardId::Chassis);
+        let mut rack = Lockstep {
+            ahead: timing.clone(),
+            timing,
+            host,
+            remotes,
+            place: place.map(|process| away.iter().position(|i| i + 1 == process)),
+            power,
+            bells,
+            rest: vec![Vec::new(); scenario.rack.tasks.len()],
+            board_of_task: scenario.rack.tasks.iter().map(|task| board_named(&task.board)).collect(),
+            board_of_slave: scenario.rack.slaves.iter().map(|slave| board_named(&slave.board)).collect(),
+            transfers: Vec::with_capacity(256),
+            to_board: Default::default(),
+            own_mail: Mail::default(),
+            window: 0,
+            recorder_owes: 0,
+            interrupted,
+            _folder: folder,
+        };
+        rack.wait_until_ready()?;
+        rack.boot()?;
+        Ok(rack)
+    }
+
+    /// Process numbers of the run.
+    pub fn pids(&self) -> impl Iterator<Item = (&str, u32)> {
+        self.power.pids()
+    }
+
+    /// Folder of the run, where it has one.
+    pub fn folder(&self) -> Option<&Path> {
+        self._folder.as_ref().map(|folder| folder.path.as_path())
+    }
+
+    /// Simulated time reached.
+    pub fn now(&self) -> Ns {
+        self.timing.now()
+    }
+
+    fn wait_until_ready(&mut self) -> Result<(), RunError> {
+        let start = Instant::now();
+        for i in 0..self.remotes.len() {
+            loop {
+                match self.remotes[i].reply(0)? {
+                    Some((_, READY, _)) => break,
+                    Some(_) => {
+                        return Err(RunError::BadAnswer {
+                            board: "unknown",
+                            what: format!("process `{}` answered before it was asked", self.remotes[i].process),
+                            when: at(0),
+                        });
+                    }
+                    None => {}
+                }
+                self.listen()?;
+                if start.elapsed() > READY_LIMIT {
+                    return Err(RunError::Stalled {
+                        process: self.remotes[i].process.clone(),
+                        how: "it did not report ready".into(),
+                        waited_s: start.elapsed().as_secs_f64(),
+                        when: at(0),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits a little for the chassis' bell; an error where a process has ended or the user wants to stop.
+    fn listen(&mut self) -> Result<(), RunError> {
+        let Some((_, bell)) = &mut self.bells else { return Ok(()) };
+        if !bell.wait(WATCH_PERIOD) {
+            self.watch()?;
+        }
+        Ok(())
+    }
+
+    fn watch(&mut self) -> Result<(), RunError> {
+        if self.interrupted.load(Ordering::Relaxed) {
+            return Err(RunError::Interrupted { when: at(self.timing.now()) });
+        }
+        match self.power.ended() {
+            Some((process, how)) => Err(RunError::Died { process, how, when: at(self.timing.now()) }),
+            None => Ok(()),
+        }
+    }
+
+    fn boot(&mut self) -> Result<(), RunError> {
+        for board in &BOARDS[1..] {
+            let grant = self.grant_of(*board, 0, 0, flags::BOOT);
+            let answer = self.ask(&grant)?;
+            if let Some((task, program)) = answer.program {
+                self.set_program(*board, task, &program)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn set_program(&mut self, board: BoardId, task: u16, program: &[Op]) -> Result<(), RunError> {
+        if self.board_of_task.get(usize::from(task)) != Some(&board) {
+            return Err(RunError::BadAnswer {
+                board: board.name(),
+                what: format!("a program for task {task}, which is not its own"),
+                when: at(self.timing.now()),
+            });
+        }
+        self.timing.set_program(task, program);
+        Ok(())
+    }
+
+    /// Runs to `end`, or until the observer stops the run.
+    pub fn run(&mut self, end: Ns, observer: &mut dyn Observer) -> Result<(), RunError> {
+        while self.timing.now() < end {
+            if self.window.is_multiple_of(1024) {
+                self.watch()?;
+            }
+            let flow = self.step(end)?;
+            let until = self.timing.now();
+            let mail = self.host.read()?;
+            let flow = match observer.window(until, mail, &self.transfers) {
+                Flow::Stop => Flow::Stop,
+                Flow::Continue => flow,
+            };
+            mail.clear();
+            if flow == Flow::Stop {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the run: the recorder closes its file, the processes leave. Returns what the boards still had to say.
+    pub fn finish(mut self) -> Result<(), RunError> {
+        let now = self.timing.now();
+        for board in &BOARDS[1..] {
+            let grant = self.grant_of(*board, now, now, flags::FINISH);
+            self.ask(&grant)?;
+        }
+        self.power.shut_down();
+        Ok(())
+    }
+
+    /// One window.
+    fn step(&mut self, end: Ns) -> Result<Flow, RunError> {
+        let from = self.timing.now();
+        let limit = end.min(from + MAX_WINDOW);
+        let mut stop = self.look_ahead(limit);
+        let mut until = self.ahead.now();
+
+        let answer = self.visit(BoardId::DaIo, from, until, 0)?;
+        self.expect_no_early(BoardId::DaIo, &answer)?;
+        let answer = self.visit(BoardId::HwSim, from, until, 0)?;
+        if let Some(early) = answer.early.filter(|early| *early < until) {
+            if early <= from {
+                return Err(RunError::BadAnswer {
+                    board: BoardId::HwSim.name(),
+                    what: format!("an early return at {early} ns, outside ({from}, {until}] ns"),
+                    when: at(from),
+                });
+            }
+            stop = self.look_ahead(early);
+            until = early;
+            self.visit(BoardId::DaIo, from, until, flags::RERUN)?;
+        }
+        self.grant(BoardId::ForceSensorIf, from, until, 0)?;
+        self.grant(BoardId::EncoderIf, from, until, 0)?;
+        self.collect(BoardId::ForceSensorIf)?;
+        self.collect(BoardId::EncoderIf)?;
+
+        let decision = match stop {
+            Stop::Decision { task, job } => Some((task, job)),
+            _ => None,
+        };
+        for board in [BoardId::ControlComputer, BoardId::Workstation] {
+            let decides = decision.filter(|(task, _)| self.board_of_task[usize::from(*task)] == board);
+            if decides.is_none() && self.to_board[board as usize].is_empty() {
+                continue;
+            }
+            let mut grant = self.grant_of(board, from, until, 0);
+            if let Some((task, job)) = decides {
+                grant.flags = flags::DECIDE;
+                (grant.task, grant.job) = (task.into(), job);
+            }
+            let answer = self.ask(&grant)?;
+            if let Some((task, _)) = decides {
+                if let Some(rest) = answer.rest {
+                    self.rest[usize::from(task)] = rest;
+                }
+                self.ahead.resume(task, &self.rest[usize::from(task)]);
+            }
+            if let Some((task, program)) = answer.program {
+                self.set_program(board, task, &program)?;
+                self.ahead.set_program(task, &program);
+            }
+        }
+        self.record(from, until)?;
+        std::mem::swap(&mut self.timing, &mut self.ahead);
+        self.window += 1;
+        Ok(Flow::Continue)
+    }
+
+    /// Runs a copy of the timing plane to the next decision point or `limit`, and sorts the transfers by the board they are made to.
+    fn look_ahead(&mut self, limit: Ns) -> Stop {
+        self.ahead.clone_from(&self.timing);
+        self.transfers.clear();
+        let stop = self.ahead.advance(limit, &mut self.transfers);
+        self.to_board.iter_mut().for_each(Vec::clear);
+        for transfer in &self.transfers {
+            if let Some(slave) = transfer.slave {
+                self.to_board[self.board_of_slave[usize::from(slave)] as usize].push(transfer.into());
+            }
+        }
+        stop
+    }
+
+    fn grant_of(&self, board: BoardId, from: Ns, until: Ns, flags: u32) -> Grant {
+        Grant { window: self.window, from, until, board: board as u32, flags, task: 0, job: 0 }
+    }
+
+    /// The recorder gets the window's transfers and a grant, and is not waited for.
+    fn record(&mut self, from: Ns, until: Ns) -> Result<(), RunError> {
+        self.own_mail.clear();
+        self.own_mail.transfers.extend(self.transfers.iter().map(TransferRecord::from));
+        self.host.send(&self.own_mail)?;
+        let recorder = BoardId::BusAnalyzer;
+        let Some(remote) = self.place[recorder as usize] else {
+            let grant = self.grant_of(recorder, from, until, 0);
+            self.host.step(&grant, &[])?;
+            return Ok(());
+        };
+        self.grant(recorder, from, until, 0)?;
+        self.recorder_owes += 1;
+        while self.remotes[remote].reply(until)?.is_some() {
+            self.recorder_owes -= 1;
+        }
+        while self.recorder_owes >= RECORDER_CREDIT {
+            self.await_reply(remote, until)?;
+            self.recorder_owes -= 1;
+        }
+        Ok(())
+    }
+
+    fn visit(&mut self, board: BoardId, from: Ns, until: Ns, flags: u32) -> Result<Answer, RunError> {
+        let grant = self.grant_of(board, from, until, flags);
+        self.ask(&grant)
+    }
+
+    fn expect_no_early(&self, board: BoardId, answer: &Answer) -> Result<(), RunError> {
+        match answer.early {
+            None => Ok(()),
+            Some(early) => Err(RunError::BadAnswer {
+                board: board.name(),
+                what: format!("an early return at {early} ns; only hw_sim may cut a window"),
+                when: at(self.timing.now()),
+            }),
+        }
+    }
+
+    /// Grants and waits for the answer.
+    fn ask(&mut self, grant: &Grant) -> Result<Answer, RunError> {
+        let board = BOARDS[grant.board as usize];
+        match self.place[board as usize] {
+            None => {
+                let transfers = &self.to_board[board as usize];
+                self.host.step(grant, transfers)
+            }
+            Some(remote) => {
+                self.send_grant(remote, grant)?;
+                self.collect_from(remote, board)
+            }
+        }
+    }
+
+    /// Grants without waiting; boards in the chassis act at once.
+    fn grant(&mut self, board: BoardId, from: Ns, until: Ns, flags: u32) -> Result<(), RunError> {
+        let grant = self.grant_of(board, from, until, flags);
+        match self.place[board as usize] {
+            None => self.host.step(&grant, &self.to_board[board as usize]).map(|_| ()),
+            Some(remote) => self.send_grant(remote, &grant),
+        }
+    }
+
+    fn collect(&mut self, board: BoardId) -> Result<(), RunError> {
+        match self.place[board as usize] {
+            None => Ok(()),
+            Some(remote) => {
+                let answer = self.collect_from(remote, board)?;
+                self.expect_no_early(board, &answer)
+            }
+        }
+    }
+
+    fn send_grant(&mut self, remote: usize, grant: &Grant) -> Result<(), RunError> {
+        let sent = self.remotes[remote].grant(grant, &self.to_board[grant.board as usize]);
+        if sent.is_err() {
+            // a process that has just died is the better explanation
+            self.watch()?;
+        }
+        sent?;
+        if let Some((bells, _)) = &self.bells {
+            bells.ring(self.remotes[remote].bell);
+        }
+        Ok(())
+    }
+
+    fn collect_from(&mut self, remote: usize, board: BoardId) -> Result<Answer, RunError> {
+        loop {
+            let (who, window, answer) = self.await_reply(remote, self.timing.now())?;
+            if who == BoardId::BusAnalyzer && self.recorder_owes > 0 {
+                self.recorder_owes -= 1;
+                continue;
+            }
+            if who == board && window == self.window {
+                return Ok(answer);
+            }
+            return Err(RunError::BadAnswer {
+                board: who.name(),
+                what: format!("window {window} where `{}` was asked for window {}", board.name(), self.window),
+                when: at(self.timing.now()),
+            });
+        }
+    }
+
+    fn await_reply(&mut self, remote: usize, now: Ns) -> Result<(BoardId, u64, Answer), RunError> {
+        let mut waiting: Option<(Instant, u64)> = None;
+        loop {
+            if let Some(reply) = self.remotes[remote].reply(now)? {
+                return Ok(reply);
+            }
+            let Some((_, bell)) = &mut self.bells else { continue };
+            if bell.wait(WATCH_PERIOD) {
+                continue;
+            }
+            self.watch()?;
+            let name = &self.remotes[remote].process;
+            let (since, used) = *waiting.get_or_insert_with(|| (Instant::now(), self.power.used(name)));
+            if since.elapsed() > STALL {
+                match self.power.idle(name, used) {
+                    Some(how) => {
+                        return Err(RunError::Stalled {
+                            process: name.clone(),
+                            how: how.into(),
+                            waited_s: since.elapsed().as_secs_f64(),
+                            when: at(now),
+                        });
+                    }
+                    // starved, not stalled
+                    None => waiting = None,
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Powers the processes of a run up, watches them, and ends them.
+//!
+//! The lifeline of a process is its standard input: a pipe whose other end the chassis holds and never writes to. When it
+//! closes, the process flushes and leaves. Ctrl-C reaches the chassis only: the processes have a group of their own.
+
+use crate::RunError;
+use rustix::process::{Pid, Signal, kill_process};
+use std::os::fd::AsFd;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+/// Time that processes get to flush and leave before they are killed.
+const LEAVE: Duration = Duration::from_secs(2);
+
+/// The processes of a run.
+#[derive(Default)]
+pub struct Power {
+    children: Vec<(String, Child)>,
+}
+
+impl Power {
+    /// Starts one process: `command` with the run folder and its own name appended.
+    pub fn spawn(&mut self, name: &str, command: &[String], folder: &Path) -> Result<(), RunError> {
+        let program = command.first().cloned().unwrap_or_default();
+        let failed = |error: std::io::Error| RunError::Spawn { process: name.to_owned(), program: program.clone(), reason: error.to_string() };
+        // results go to standard output, and only the chassis has any
+        let stderr = std::io::stderr().as_fd().try_clone_to_owned().map_err(failed)?;
+        let child = Command::new(&program)
+            .args(command.iter().skip(1))
+            .arg("--run")
+            .arg(folder)
+            .arg("--process")
+            .arg(name)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::from(stderr))
+            .process_group(0)
+            .spawn()
+            .map_err(failed)?;
+        self.children.push((name.to_owned(), child));
+        Ok(())
+    }
+
+    /// Process numbers, in the order of starting.
+    pub fn pids(&self) -> impl Iterator<Item = (&str, u32)> {
+        self.children.iter().map(|(name, child)| (name.as_str(), child.id()))
+    }
+
+    /// A process that has ended, killed ones first, since others may have followed them.
+    pub fn ended(&mut self) -> Option<(String, String)> {
+        let mut ended: Vec<(String, ExitStatus)> = Vec::new();
+        for (name, child) in &mut self.children {
+            if let Ok(Some(status)) = child.try_wait() {
+                ended.push((name.clone(), status));
+            }
+        }
+        ended.sort_by_key(|(_, status)| status.signal().is_none());
+        ended.into_iter().next().map(|(name, status)| (name, describe(status)))
+    }
+
+    /// Whether the process is stopped or has used no processor time since `before`; its words for it.
+    pub fn idle(&self, name: &str, before: u64) -> Option<&'static str> {
+        let (state, used) = self.activity(name)?;
+        match state {
+            'T' | 't' => Some("stopped by a signal"),
+            _ if used == before => Some("alive, but it uses no processor time"),
+            _ => None,
+        }
+    }
+
+    /// Processor time used by the process so far, clock ticks.
+    pub fn used(&self, name: &str) -> u64 {
+        self.activity(name).map_or(0, |(_, used)| used)
+    }
+
+    fn activity(&self, name: &str) -> Option<(char, u64)> {
+        let (_, child) = self.children.iter().find(|(known, _)| known == name)?;
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
+        // the name in parentheses may hold anything
+        let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+        let state = fields.first()?.chars().next()?;
+        let used = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
+        Some((state, used))
+    }
+
+    /// Ends all processes: lifelines first, SIGKILL for those that do not leave. Returns the names of the killed.
+    pub fn shut_down(&mut self) -> Vec<String> {
+        for (_, child) in &mut self.children {
+            drop(child.stdin.take());
+        }
+        let deadline = Instant::now() + LEAVE;
+        let mut killed = Vec::new();
+        for (name, child) in &mut self.children {
+            loop {
+                match child.try_wait() {
+                    Ok(Some(_)) | Err(_) => break,
+                    Ok(None) if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(2)),
+                    Ok(None) => {
+                        if let Some(pid) = Pid::from_raw(child.id() as i32) {
+                            // it may have left in this very moment
+                            let _ = kill_process(pid, Signal::KILL);
+                        }
+                        let _ = child.wait();
+                        killed.push(name.clone());
+                        break;
+                    }
+                }
+            }
+        }
+        self.children.clear();
+        killed
+    }
+}
+
+impl Drop for Power {
+    fn drop(&mut self) {
+        self.shut_down();
+    }
+}
+
+fn describe(status: ExitStatus) -> String {
+    match (status.code(), status.signal()) {
+        (Some(code), _) => format!("ended with exit code {code}"),
+        (None, Some(9)) => "was killed (SIGKILL)".into(),
+        (None, Some(signal)) => format!("was killed by signal {signal}"),
+        (None, None) => "ended".into(),
+    }
+}

@@ -1,0 +1,123 @@
+//! The line between the chassis and one process: grants one way, replies the other.
+
+use crate::RunError;
+use crate::error::at;
+use crate::host::Answer;
+use board::BoardId;
+use channels::{ChannelError, Domain, Port, Sender};
+use messages::{Grant, OpRecord, Reply, TransferRecord, flags};
+use vme::{Ns, Op};
+
+/// Grants that may be under way: the recorder's credit and some.
+const BUFFER: usize = 80;
+/// Transfers of a grant, operations of a reply: longer messages allocate once.
+const LENGTH: usize = 64;
+/// No board has a longer program.
+const MAX_OPS: usize = 4096;
+
+fn names(process: &str) -> (String, String) {
+    (format!("grant/{process}"), format!("reply/{process}"))
+}
+
+/// The chassis' end.
+pub(crate) struct Remote {
+    /// Name of the process.
+    pub process: String,
+    /// Its bell.
+    pub bell: usize,
+    grants: Sender<TransferRecord, Grant>,
+    replies: Port<OpRecord, Reply>,
+}
+
+impl Remote {
+    pub fn open(domain: &Domain, process: &str, bell: usize) -> Result<Remote, ChannelError> {
+        let (grant, reply) = names(process);
+        Ok(Remote {
+            process: process.to_owned(),
+            bell,
+            grants: Sender::open(domain, &grant, 1, BUFFER, LENGTH)?,
+            replies: Port::open(domain, &reply, 1, BUFFER)?,
+        })
+    }
+
+    pub fn grant(&self, grant: &Grant, transfers: &[TransferRecord]) -> Result<(), RunError> {
+        Ok(self.grants.send(grant, transfers)?)
+    }
+
+    /// The next reply, if there is one.
+    pub fn reply(&self, now: Ns) -> Result<Option<(BoardId, u64, Answer)>, RunError> {
+        let mut taken = None;
+        self.replies.receive(|reply, ops| {
+            let mut count = 0;
+            let ops: Option<Vec<Op>> = ops.inspect(|_| count += 1).take(MAX_OPS).map(OpRecord::op).collect();
+            taken = Some((*reply, ops.filter(|_| count <= MAX_OPS)));
+        })?;
+        let Some((reply, ops)) = taken else { return Ok(None) };
+        let bad = |what: &str| RunError::BadAnswer {
+            board: BoardId::from_number(reply.board as u8).map_or("unknown", BoardId::name),
+            what: format!("process `{}` sent {what}", self.process),
+            when: at(now),
+        };
+        let board = BoardId::from_number(reply.board as u8).ok_or_else(|| bad("a board number that does not exist"))?;
+        let ops = ops.ok_or_else(|| bad("a bus program with an operation that does not exist, or a far too long one"))?;
+        let mut answer = Answer::default();
+        if reply.flags & flags::EARLY != 0 {
+            answer.early = Some(reply.early);
+        }
+        if reply.flags & flags::PROGRAM != 0 {
+            answer.program = Some((reply.task as u16, ops));
+        } else if reply.flags & flags::NEW_REST != 0 {
+            answer.rest = Some(ops);
+        }
+        Ok(Some((board, reply.window, answer)))
+    }
+}
+
+/// The process' end.
+pub(crate) struct Line {
+    grants: Port<TransferRecord, Grant>,
+    replies: Sender<OpRecord, Reply>,
+    ops: Vec<OpRecord>,
+}
+
+/// Window number of the reply that says "ready", before the first grant.
+pub(crate) const READY: u64 = u64::MAX;
+
+impl Line {
+    pub fn open(domain: &Domain, process: &str) -> Result<Line, ChannelError> {
+        let (grant, reply) = names(process);
+        Ok(Line {
+            grants: Port::open(domain, &grant, 1, BUFFER)?,
+            replies: Sender::open(domain, &reply, 1, BUFFER, LENGTH)?,
+            ops: Vec::with_capacity(LENGTH),
+        })
+    }
+
+    pub fn grant(&self, transfers: &mut Vec<TransferRecord>) -> Result<Option<Grant>, ChannelError> {
+        let mut grant = None;
+        self.grants.receive(|header, payload| {
+            grant = Some(*header);
+            transfers.clear();
+            transfers.extend(payload);
+        })?;
+        Ok(grant)
+    }
+
+    pub fn reply(&mut self, board: BoardId, window: u64, answer: &Answer) -> Result<(), ChannelError> {
+        let mut reply = Reply { window, early: 0, board: board as u32, flags: 0, task: 0, wall_ns: 0 };
+        self.ops.clear();
+        if let Some(early) = answer.early {
+            reply.early = early;
+            reply.flags |= flags::EARLY;
+        }
+        if let Some((task, program)) = &answer.program {
+            reply.task = u32::from(*task);
+            reply.flags |= flags::PROGRAM;
+            self.ops.extend(program.iter().map(|op| OpRecord::from(*op)));
+        } else if let Some(rest) = &answer.rest {
+            reply.flags |= flags::NEW_REST;
+            self.ops.extend(rest.iter().map(|op| OpRecord::from(*op)));
+        }
+        self.replies.send(&reply, &self.ops)
+    }
+}

@@ -1,0 +1,96 @@
+//! The whole `main` of a process that hosts boards.
+
+use crate::host::{Answer, Factory, Host};
+use crate::remote::{Line, READY};
+use crate::{RunError, RunFolder};
+use board::BoardId;
+use channels::{Bells, Domain, Exchange};
+use messages::{BOARDS, Grant, flags};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// How often an idle process looks whether its run still lives.
+const LIFELINE_PERIOD: Duration = Duration::from_millis(100);
+/// Bell of the chassis; the others follow in the order of the scenario's processes.
+pub(crate) const CHASSIS_BELL: usize = 0;
+
+/// Runs the boards of the process that the command line names (`--run FOLDER --process NAME`), until the run ends.
+///
+/// A user's own board is one line: `fn main() -> ExitCode { pacing::serve(&|_, context| Ok(Box::new(Mine::new(&context.scenario)?))) }`.
+pub fn serve(factory: Factory<'_>) -> ExitCode {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
+    // a second initialisation in one process is harmless
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    let mut arguments = std::env::args().skip_while(|argument| argument != "--run");
+    let (run, folder, key, name) = (arguments.next(), arguments.next(), arguments.next(), arguments.next());
+    let (Some(_), Some(folder), Some("--process"), Some(name)) = (run, folder, key.as_deref(), name) else {
+        eprintln!("this program is a board of a rack; `vmerack run` starts it with --run FOLDER --process NAME");
+        return ExitCode::from(2);
+    };
+    match host_until_the_end(PathBuf::from(folder), &name, factory) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{name}: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result<(), RunError> {
+    let folder = RunFolder::join(&path)?;
+    let context = folder.read_context()?;
+    let processes = &context.scenario.processes;
+    let Some(index) = processes.iter().position(|process| process.name == name) else {
+        return Err(RunError::Folder { path: path.display().to_string(), reason: format!("no process `{name}` in this run") });
+    };
+    let here: Vec<BoardId> = processes[index].boards.iter().filter_map(|board| BoardId::from_name(board)).collect();
+    let domain = Domain::join(&folder.path, &folder.prefix, name)?;
+    let exchange = Exchange::open(&here, Some(&domain), |board| process_of(&context.scenario, board))?;
+    let mut line = Line::open(&domain, name)?;
+    let bells = Bells::open(&folder.path.join("bells"), processes.len() + 1)?;
+    let mut bell = bells.bell(index + 1);
+    let mut host = Host::new(&here, exchange, &context, factory)?;
+    let mut transfers = Vec::with_capacity(64);
+    line.reply(here[0], READY, &Answer::default())?;
+    bells.ring(CHASSIS_BELL);
+    let mut until = 0;
+    loop {
+        while let Some(grant) = line.grant(&mut transfers)? {
+            let answer = host.step(&grant, &transfers)?;
+            until = grant.until;
+            let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
+            line.reply(board, grant.window, &answer)?;
+            bells.ring(CHASSIS_BELL);
+        }
+        if !bell.wait(LIFELINE_PERIOD) && lifeline_cut() {
+            if here.contains(&BoardId::BusAnalyzer) {
+                // the record up to here is worth keeping
+                host.step(&closing_grant(BoardId::BusAnalyzer, until), &[])?;
+            }
+            return Ok(());
+        }
+    }
+}
+
+pub(crate) fn closing_grant(board: BoardId, until: vme::Ns) -> Grant {
+    Grant { window: u64::MAX - 1, from: until, until, board: board as u32, flags: flags::FINISH, task: 0, job: 0 }
+}
+
+/// Number of the process that hosts the board; the chassis is 0. Boards of a process named `chassis` live in it.
+pub(crate) fn process_of(scenario: &scenario::Scenario, board: BoardId) -> usize {
+    scenario
+        .processes
+        .iter()
+        .position(|process| process.name != BOARDS[0].name() && process.boards.iter().any(|name| name == board.name()))
+        .map_or(0, |i| i + 1)
+}
+
+/// The chassis has closed our standard input, or is gone.
+fn lifeline_cut() -> bool {
+    let stdin = std::io::stdin();
+    let mut poll_fd = [PollFd::new(&stdin, PollFlags::empty())];
+    let now = Timespec { tv_sec: 0, tv_nsec: 0 };
+    matches!(poll(&mut poll_fd, Some(&now)), Ok(1)) && poll_fd[0].revents().intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL)
+}

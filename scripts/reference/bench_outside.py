@@ -3,14 +3,15 @@
 
 Pinocchio: compiled from the wheel's headers in two builds, plain -O3 and -march=native; both are printed. MuJoCo: the
 wheel's library, called from C++. Without g++, the Python calls are timed instead and the tool's name says `python`
-(1-3 microseconds of each such figure are the call from Python). Needs scripts/reference/requirements.txt.
+(1-3 microseconds of each such figure are the call from Python). Needs scripts/reference/requirements.txt. The
+programs are compiled once (minutes), into the build folder, and again only when their source is newer.
 
     .venv/bin/python scripts/reference/bench_outside.py
 """
+import os
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -19,7 +20,8 @@ import numpy as np
 import pinocchio as pin
 
 HERE = Path(__file__).resolve().parent
-URDF = HERE.parents[1] / "shared/arm/src/robots/rediestro.urdf"
+ROOT = HERE.parents[1]
+URDF = ROOT / "shared/arm/src/robots/rediestro.urdf"
 sys.path.insert(0, str(HERE))
 from arm_reference import mujoco_model  # noqa: E402
 
@@ -47,8 +49,7 @@ def compiled(work):
     headers += ["-DBOOST_MPL_LIMIT_LIST_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS", "-DBOOST_FUSION_INVOKE_MAX_ARITY=10"]
     for name, options in (("pinocchio", []), ("pinocchio-native", ["-march=native"])):
         binary = work / name
-        source = HERE / "bench_pinocchio.cpp"
-        subprocess.run(["g++", "-std=c++17", "-O3", "-DNDEBUG", *options, *headers, source, "-o", binary], check=True)
+        build(HERE / "bench_pinocchio.cpp", binary, [*options, *headers])
         report(name, subprocess.run([binary], input=arm, text=True, capture_output=True, check=True).stdout)
 
     wheel = Path(mujoco.__file__).parent
@@ -57,9 +58,14 @@ def compiled(work):
     mujoco_model(URDF)
     mujoco.mj_saveLastXML(str(model), mujoco_model(URDF))
     binary = work / "mujoco-bench"
-    command = ["g++", "-std=c++17", "-O3", "-DNDEBUG", f"-I{wheel}/include", HERE / "bench_mujoco.cpp", library]
-    subprocess.run([*command, f"-Wl,-rpath,{wheel}", "-o", binary], check=True)
+    build(HERE / "bench_mujoco.cpp", binary, [f"-I{wheel}/include", library, f"-Wl,-rpath,{wheel}"])
     report("mujoco", subprocess.run([binary, model], text=True, capture_output=True, check=True).stdout)
+
+
+def build(source, binary, options):
+    if binary.exists() and binary.stat().st_mtime > source.stat().st_mtime:
+        return
+    subprocess.run(["g++", "-std=c++17", "-O3", "-DNDEBUG", source, *options, "-o", binary], check=True)
 
 
 def report(tool, text):
@@ -89,7 +95,8 @@ def from_python():
 
 if __name__ == "__main__":
     if shutil.which("g++"):
-        with tempfile.TemporaryDirectory() as folder:
-            compiled(Path(folder))
+        work = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "bench-outside"
+        work.mkdir(parents=True, exist_ok=True)
+        compiled(work)
     else:
         from_python()

@@ -64,20 +64,32 @@ fn the_surrogate_masses_ask_for_the_torques_they_were_chosen_for() {
     let rotors = JointMatrix::from_diagonal(
         &DriveData::rediestro().each(|d| d.rotor_inertia_at_output_kg_m2),
     );
-    let in_z = |m: JointMatrix| {
+    let task = |m: JointMatrix| {
+        (j * m.try_inverse().expect("a mass matrix") * j.transpose()).try_inverse()
+    };
+    // the tip pushed along z: free to give way in the other axes, or guided by them
+    let free = |m: JointMatrix| {
         1.0 / (j * m.try_inverse().expect("a mass matrix") * j.transpose())[(2, 2)]
     };
+    let guided = task(m + rotors).expect("not singular")[(2, 2)];
     println!(
-        "task inertia in z: links {} kg, with rotors {} kg",
-        in_z(m),
-        in_z(m + rotors)
+        "task inertia in z: links {}, with rotors {}, guided {guided} kg",
+        free(m),
+        free(m + rotors)
     );
+    assert!((guided - 22.5).abs() < 0.1, "{guided} kg");
     let stiffness = DriveData::rediestro().each(|d| d.stiffness_nm_per_rad);
-    println!(
-        "joint-only k_z {} kN/m",
-        1e-3 * in_z(JointMatrix::from_diagonal(&stiffness))
-    );
+    let k_z = free(JointMatrix::from_diagonal(&stiffness));
+    assert!((k_z - 54e3).abs() < 1e3, "{k_z} N/m");
     assert!(SymmetricEigen::new(m).eigenvalues.min() > 0.0);
+}
+
+#[test]
+fn the_reach_is_about_1_4_m_from_the_shoulder() {
+    let model = ArmModel::rediestro();
+    assert!((model.shoulder() - Vector3::new(0.0, 0.0, 0.95229)).norm() < 1e-12);
+    let reach = model.reach();
+    assert!((1.35..1.5).contains(&reach), "{reach}");
 }
 
 #[test]

@@ -1,1 +1,24 @@
-//! bus_analyzer
+//! Bus analyzer: the card that sits in a slot and records, and the tools for its records.
+//!
+//! * [`BusAnalyzer`]: the board. It turns probes, events and transfers into ROS 2 messages ([`encode`] on
+//!   [`cdr`], described by [`topics`] and [`schema`]) and hands them to a [`record`] and to a [`digest`].
+//! * [`digest_file`]: the SHA-256 of all that a record says in simulated time.
+//! * [`recover()`]: a truncated record made whole.
+//!
+//! A record that cannot be written any more is given up; the rack goes on and [`BusAnalyzer::lost`] says why.
+
+mod board;
+pub mod cdr;
+pub mod digest;
+pub mod encode;
+pub mod record;
+pub mod recover;
+pub mod robot;
+pub mod schema;
+pub mod topics;
+
+pub use board::BusAnalyzer;
+pub use digest::{DigestError, digest_file};
+pub use record::Lost;
+pub use recover::{Recovered, RecoverError, recover};
+pub use topics::Topic;

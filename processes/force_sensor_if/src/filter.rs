@@ -82,3 +82,76 @@ impl Stage {
         sum
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f64::consts::TAU;
+    use stability::cascade::Filter;
+
+    #[test]
+    fn a_sine_leaves_every_filter_as_its_transfer_function_says() {
+        for n in 1..=FILTERS {
+            let filter = Filter::number(n).unwrap();
+            let published = DECIMATION.pow(n as u32) as u64;
+            // up to the cut-off, over it, and near the Nyquist frequency of the output
+            for share in [0.05, 0.5, 1.0, 1.5, 1.9] {
+                let omega = TAU * filter.cutoff() * share;
+                let sine = |t: f64| (omega * t).sin();
+                let mut cascade = Cascade::settled([0.0; AXES]);
+                let mut worst = 0.0_f64;
+                // the start has left the filter after twice its delay
+                for k in 0..60 * published {
+                    let t = k as f64 / 8000.0;
+                    cascade.push(k, [sine(t); AXES]);
+                    if k.is_multiple_of(published) && t > 2.0 * filter.delay() + 0.01 {
+                        let expected = filter.gain(omega) * sine(t - filter.delay());
+                        worst = worst.max((cascade.output(n)[5] - expected).abs());
+                    }
+                }
+                assert!(worst < 1e-9, "filter {n}, {share} of the cut-off: {worst}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_response_ends_at_exactly_the_length_of_the_taps() {
+        // 24 input samples of each stage, then nothing of the past is left
+        let mut cascade = Cascade::settled([0.0; AXES]);
+        let end = 24 * (1 + 4 + 16 + 64);
+        for k in 1..=end {
+            cascade.push(k, [1.0, -2.0, 0.0, 0.5, 1e-3, 1e3]);
+        }
+        cascade.push(end + 1, [1.0, -2.0, 0.0, 0.5, 1e-3, 1e3]);
+        for k in end + 2..=end + 256 {
+            cascade.push(k, [1.0, -2.0, 0.0, 0.5, 1e-3, 1e3]);
+        }
+        for (value, expected) in cascade
+            .output(4)
+            .iter()
+            .zip([1.0, -2.0, 0.0, 0.5, 1e-3, 1e3])
+        {
+            assert!(
+                (value - expected).abs() <= 1e-14 * expected.abs(),
+                "{value}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_settled_cascade_shows_the_constant_behind_every_filter() {
+        let mut cascade = Cascade::settled([3.0; AXES]);
+        for k in 0..=4096 {
+            cascade.push(k, [3.0; AXES]);
+        }
+        for n in 1..=FILTERS {
+            assert!(
+                cascade
+                    .output(n)
+                    .iter()
+                    .all(|value| (value - 3.0).abs() < 1e-14),
+                "filter {n}"
+            );
+        }
+    }
+}

@@ -122,3 +122,38 @@ impl Noise {
         ((self.rng.next_u64() >> 11) + 1) as f64 / (1_u64 << 53) as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_noise_is_standard_normal() {
+        let mut noise = Noise::new(7, [1.0; AXES]);
+        let draws: Vec<f64> = (0..20_000).flat_map(|_| noise.draw()).collect();
+        let n = draws.len() as f64;
+        let moment = |power: i32| draws.iter().map(|x| x.powi(power)).sum::<f64>() / n;
+        // five standard errors of the moments of N(0, 1): 0, 1, 0, 3
+        assert!(moment(1).abs() < 5.0 / n.sqrt());
+        assert!((moment(2) - 1.0).abs() < 5.0 * (2.0 / n).sqrt());
+        assert!(moment(3).abs() < 5.0 * (15.0 / n).sqrt());
+        assert!((moment(4) - 3.0).abs() < 5.0 * (96.0 / n).sqrt());
+        let beyond = |limit: f64| draws.iter().filter(|x| x.abs() > limit).count() as f64 / n;
+        assert!((beyond(1.959964) - 0.05).abs() < 5.0 * (0.05_f64 * 0.95 / n).sqrt());
+    }
+
+    #[test]
+    fn axes_and_samples_are_independent() {
+        let mut noise = Noise::new(3, [1.0; AXES]);
+        let draws: Vec<[f64; AXES]> = (0..20_000).map(|_| noise.draw()).collect();
+        let n = draws.len() as f64;
+        for a in 0..AXES {
+            for b in 0..AXES {
+                let same = draws.iter().map(|x| x[a] * x[b]).sum::<f64>() / n;
+                let next = draws.windows(2).map(|w| w[0][a] * w[1][b]).sum::<f64>() / n;
+                assert!(a == b || same.abs() < 5.0 / n.sqrt(), "{a} {b}: {same}");
+                assert!(next.abs() < 5.0 / n.sqrt(), "{a} {b}: {next}");
+            }
+        }
+    }
+}

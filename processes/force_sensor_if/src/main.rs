@@ -3,5 +3,9 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    pacing::serve(&|_, context| Ok(Box::new(force_sensor_if::ForceSensorIf::new(&context.scenario)?)))
+    pacing::serve(&|_, context| {
+        Ok(Box::new(force_sensor_if::ForceSensorIf::new(
+            &context.scenario,
+        )?))
+    })
 }

@@ -99,3 +99,54 @@ fn register(offset: u32) -> Register {
         _ => Register::Other,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_map_is_that_of_the_receivers_manual() {
+        // word numbers: filters from 0x90 in steps of 8, counters 0xE8 to 0xED and 0xEF, warnings 0xF0, errors 0xF1
+        let word = |number: u32| Word::Bits16.register(2 * number);
+        assert_eq!(word(0x80), Register::FullScale(0));
+        assert_eq!(word(0x8D), Register::Offset(5));
+        assert_eq!(word(0x92), Register::Filter(0, 2));
+        assert_eq!(word(0xB5), Register::Filter(4, 5));
+        assert_eq!(word(0xEF), Register::Counter(0));
+        assert_eq!(word(0xE8), Register::Counter(1));
+        assert_eq!(word(0xED), Register::Counter(6));
+        assert_eq!(word(0xF0), Register::Warnings);
+        assert_eq!(word(0xF1), Register::Errors);
+        for other in [0, 0x86, 0x8E, 0x96, 0xC6, 0xEE, 0xF2] {
+            assert_eq!(word(other), Register::Other, "{other:#x}");
+        }
+    }
+
+    #[test]
+    fn a_32_bit_card_has_the_same_map_at_twice_the_offsets() {
+        for offset in (0..0x200).step_by(2) {
+            assert_eq!(
+                Word::Bits32.register(2 * offset),
+                Word::Bits16.register(offset)
+            );
+        }
+        assert_eq!(Word::for_counts(32768.0), Word::Bits16);
+        assert_eq!(Word::for_counts(1e9), Word::Bits32);
+    }
+
+    #[test]
+    fn words_round_and_saturate_and_keep_their_sign() {
+        for (number, word) in [
+            (1.4, 1),
+            (-1.6, 0xFFFE),
+            (1e9, 0x7FFF),
+            (-1e9, 0x8000),
+            (-32768.0, 0x8000),
+        ] {
+            assert_eq!(Word::Bits16.signed(number), word, "{number}");
+        }
+        assert_eq!(Word::Bits32.signed(-1e9), -1_000_000_000_i32 as u32);
+        assert_eq!(Word::Bits16.number(0xFFFE), -2.0);
+        assert_eq!(Word::Bits32.number(0xFFFF_FFFE), -2.0);
+    }
+}

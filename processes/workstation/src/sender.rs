@@ -7,7 +7,7 @@
 use messages::Command;
 use vme::Ns;
 
-/// Polls that show a command as not accepted before it is .
+/// Polls that show a command as not accepted before it is sent again.
 pub const PATIENCE: u32 = 3;
 
 /// How often a command is sent at most.
@@ -92,5 +92,132 @@ impl Sender {
 
     fn settle(&mut self, settled: usize) {
         (self.settled, self.polls, self.sendings) = (settled, 0, 1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: Ns = 1_000_000_000;
+
+    /// Commands whose segments start at these seconds.
+    fn commands(starts: &[u64]) -> Vec<Command> {
+        (1..)
+            .zip(starts)
+            .map(|(epoch, start)| Command {
+                epoch,
+                start: start * SECOND,
+                ..bytemuck::Zeroable::zeroed()
+            })
+            .collect()
+    }
+
+    fn nothing() -> Poll {
+        Poll {
+            send: (0, 0),
+            given_up: None,
+        }
+    }
+
+    #[test]
+    fn a_command_is_sent_once_when_its_segment_comes_within_the_horizon() {
+        let mut sender = Sender::new(commands(&[0, 3, 3, 9]), 2 * SECOND);
+        let mut sent = Vec::new();
+        for second in 0..12 {
+            let accepted = sent.len() as u32;
+            let Poll {
+                send: (first, end),
+                given_up,
+            } = sender.poll(second * SECOND, Some(accepted));
+            assert_eq!(given_up, None);
+            sent.extend((first..end).map(|i| (second, sender.commands()[i].epoch)));
+        }
+        assert_eq!(sent, [(0, 1), (1, 2), (1, 3), (7, 4)]);
+    }
+
+    #[test]
+    fn a_command_not_accepted_is_sent_again_with_all_that_followed_it_and_then_given_up() {
+        let mut sender = Sender::new(commands(&[0, 0, 0]), SECOND);
+        let mut sendings = Vec::new();
+        let mut given_up = None;
+        for poll in 0..30 {
+            // the second never arrives
+            let Poll {
+                send: (first, end),
+                given_up: lost,
+            } = sender.poll(poll, Some(if poll == 0 { 0 } else { 1 }));
+            sendings.extend((first..end).map(|i| (poll, sender.commands()[i].epoch)));
+            if lost.is_some() {
+                given_up = Some((poll, lost));
+                break;
+            }
+        }
+        assert_eq!(
+            sendings,
+            [
+                (0, 1),
+                (0, 2),
+                (0, 3),
+                (4, 2),
+                (4, 3),
+                (7, 2),
+                (7, 3),
+                (10, 2),
+                (10, 3)
+            ]
+        );
+        assert_eq!(given_up, Some((13, Some(2))));
+    }
+
+    #[test]
+    fn after_a_command_is_given_up_the_next_ones_are_cared_for() {
+        let mut sender = Sender::new(commands(&[0, 0, 5]), SECOND);
+        let mut lost = Vec::new();
+        for poll in 0..100 {
+            lost.extend(sender.poll(poll, Some(0)).given_up);
+        }
+        assert_eq!(lost, [1, 2]);
+        assert_eq!(sender.poll(6 * SECOND, Some(0)).send, (2, 3));
+    }
+
+    #[test]
+    fn a_late_acceptance_ends_the_repetition() {
+        let mut sender = Sender::new(commands(&[0]), SECOND);
+        assert_eq!(sender.poll(0, Some(0)).send, (0, 1));
+        for _ in 0..2 {
+            assert_eq!(sender.poll(1, Some(0)).send, (1, 1));
+        }
+        assert_eq!(sender.poll(2, Some(0)).send, (0, 1));
+        for _ in 0..20 {
+            assert_eq!(
+                sender.poll(3, Some(1)),
+                Poll {
+                    send: (1, 1),
+                    given_up: None
+                }
+            );
+        }
+    }
+
+    #[test]
+    fn polls_without_a_state_block_do_not_count() {
+        let mut sender = Sender::new(commands(&[0]), SECOND);
+        sender.poll(0, None);
+        for _ in 0..50 {
+            assert_eq!(
+                sender.poll(1, None),
+                Poll {
+                    send: (1, 1),
+                    given_up: None
+                }
+            );
+        }
+    }
+
+    #[test]
+    fn a_scenario_without_segments_sends_nothing() {
+        let mut sender = Sender::new(Vec::new(), SECOND);
+        assert_eq!(sender.poll(0, Some(0)), nothing());
     }
 }

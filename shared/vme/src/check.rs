@@ -566,7 +566,7 @@ impl Rack {
         if access.is_address_only() {
             return Ok(());
         }
-        let Some(slave) = self.slaves.iter().find(|slave| answers(slave, access)) else {
+        let Some(slave) = self.slaves.iter().find(|slave| slave.answers(access)) else {
             return Err(RackError::NoSlave {
                 master: master(),
                 addr: access.addr,
@@ -614,7 +614,7 @@ impl Rack {
                         .slaves
                         .iter()
                         .enumerate()
-                        .find(|(_, slave)| answers(slave, access));
+                        .find(|(_, slave)| slave.answers(access));
                     let plan = cycle::plan(
                         &self.bus,
                         access,
@@ -646,11 +646,4 @@ impl Rack {
         }
         Ok(())
     }
-}
-
-/// Whether the window holds the first byte of the access.
-pub(crate) fn answers(slave: &Slave, access: &Access) -> bool {
-    cycle::single(slave.am) == cycle::single(access.am)
-        && access.addr >= slave.base
-        && access.addr - slave.base < slave.size
 }

@@ -7,9 +7,10 @@
 use crate::Ns;
 use crate::adaptor::Adaptor;
 use crate::arbiter::Mode;
+use crate::cycle;
 use crate::interrupt::Interrupter;
 use crate::processor::Processor;
-use crate::program::Width;
+use crate::program::{Access, Width};
 use crate::traffic::Traffic;
 use serde::{Deserialize, Serialize};
 
@@ -99,6 +100,15 @@ pub struct Slave {
     /// The window leads through this adaptor to another bus, and answers only while its link is up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adaptor: Option<String>,
+}
+
+impl Slave {
+    /// Whether the window holds the first byte of the access.
+    pub fn answers(&self, access: &Access) -> bool {
+        cycle::single(self.am) == cycle::single(access.am)
+            && access.addr >= self.base
+            && access.addr - self.base < self.size
+    }
 }
 
 /// One task of a processor card. Its program comes from the board that runs it.

@@ -2,7 +2,7 @@
 
 use crate::Ns;
 use crate::arbiter::{Place, SLOTS};
-use crate::check::{RackError, answers};
+use crate::check::RackError;
 use crate::cycle;
 use crate::program::Access;
 use crate::rack::{Rack, Release};
@@ -255,7 +255,7 @@ impl Wiring {
         self.rack
             .slaves
             .iter()
-            .position(|slave| answers(slave, access))
+            .position(|slave| slave.answers(access))
             .map(|i| i as u16)
     }
 

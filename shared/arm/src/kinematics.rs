@@ -2,7 +2,6 @@
 
 use crate::model::ArmModel;
 use crate::small::{M3, V3};
-use crate::trig::sin_cos;
 use crate::{DOF, Jacobian, JointVector, Spatial};
 use nalgebra::{Matrix3, Vector3};
 
@@ -42,13 +41,12 @@ pub(crate) struct Frames {
 impl Frames {
     #[inline(always)]
     pub fn new(model: &ArmModel, q: &JointVector) -> Frames {
-        let sc = sin_cos(q);
         let mut r = [M3::IDENTITY; DOF];
         let mut o = [V3::ZERO; DOF];
         let (mut rp, mut op) = (M3::IDENTITY, V3::ZERO);
         for i in 0..DOF {
             let joint = &model.joints[i];
-            let (s, c) = (sc.sin[i], sc.cos[i]);
+            let (s, c) = libm::sincos(q[i]);
             let t = if i == 0 { joint.r } else { rp * joint.r };
             op = if i == 0 { joint.p } else { op + rp * joint.p };
             rp = M3 {

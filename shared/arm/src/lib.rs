@@ -29,7 +29,6 @@ pub mod rotation;
 mod slide;
 mod small;
 mod state;
-mod trig;
 mod urdf;
 
 pub use aba::aba;

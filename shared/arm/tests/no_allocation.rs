@@ -46,7 +46,7 @@ fn no_algorithm_allocates() {
             crba(model, &q).sum() + aba(model, &q, &qd, &q, &qd.abs(), &Spatial::repeat(1.0)).sum();
         let state = ArmState::new(model, &q, &qd);
         sum += state.mass_matrix().sum() + state.rnea(&q).sum() + state.tip_motion().twist.sum();
-        // an angle beyond the fast reduction's range
+        // a large angle, whose reduction takes another way
         sum += rnea(model, &JointVector::repeat(1e9), &qd, &q).sum();
     }
     let after = COUNT.with(Cell::get);

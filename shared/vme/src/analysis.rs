@@ -108,8 +108,8 @@ pub struct Bounds {
 #[derive(Clone, Debug)]
 struct Demand {
     master: u16,
-    /// Task that asks, if it is one: its jobs must end in time for `per_job` to be a bound.
-    task: Option<usize>,
+    /// Who asks; it must end in time for `stream` to hold. Handlers and polling loops cannot be late.
+    source: Option<Source>,
     /// The accesses of one job.
     accesses: Vec<Tenure>,
     /// `None`: without limit.
@@ -131,8 +131,8 @@ struct Tenure {
 struct Analysis<'a> {
     timing: &'a Timing,
     demands: Vec<Demand>,
-    /// Tasks whose jobs are not known to end in time.
-    late: Vec<bool>,
+    /// Whose jobs or requests are not known to end before the next one.
+    late: Vec<Source>,
 }
 
 /// Bounds of the timing plane's rack, where task `t` does `programs[t]` at most in each job.
@@ -141,43 +141,54 @@ pub fn bounds(timing: &Timing, programs: &[Vec<Op>]) -> Bounds {
     let mut analysis = Analysis {
         timing,
         demands: demands(timing, programs),
-        late: vec![false; rack.tasks.len()],
+        late: Vec::new(),
     };
     loop {
+        let late_before = analysis.late.len();
+        let in_time = |source, bound: Option<Ns>, period: Ns| {
+            let bound = bound.filter(|&bound| bound <= period && !analysis.late.contains(&source));
+            (source, bound)
+        };
         let response: Vec<_> = (0..rack.tasks.len())
-            .map(|t| analysis.response(t, programs))
+            .map(|t| {
+                in_time(
+                    Source::Task(t),
+                    analysis.response(t, programs),
+                    rack.tasks[t].period_ns,
+                )
+            })
             .collect();
-        let in_time = |t: usize| response[t].is_some_and(|r| r <= rack.tasks[t].period_ns);
-        let late: Vec<bool> = (0..rack.tasks.len())
-            .map(|t| analysis.late[t] || !in_time(t))
+        let traffic: Vec<_> = (rack.traffic.iter().enumerate())
+            .map(|(g, spec)| {
+                let periodic = spec.arrivals == Arrivals::Periodic;
+                let bound = analysis
+                    .access(Source::Traffic(g), &spec.access())
+                    .filter(|_| periodic);
+                in_time(Source::Traffic(g), bound, spec.period_ns)
+            })
             .collect();
-        if late == analysis.late {
+        let late: Vec<Source> = response
+            .iter()
+            .chain(&traffic)
+            .filter(|(_, bound)| bound.is_none())
+            .map(|(source, _)| *source)
+            .collect();
+        if late.len() == late_before {
             let access = (0..rack.tasks.len())
                 .map(|t| {
-                    (accesses(&programs[t]))
-                        .map(|access| analysis.access(Source::Task(t), &access))
-                        .try_fold(0, longest)
+                    let bound = |access| analysis.access(Source::Task(t), &access);
+                    accesses(&programs[t]).map(bound).try_fold(0, longest)
                 })
                 .collect();
-            let traffic = (0..rack.traffic.len())
-                .map(|g| {
-                    let spec = &rack.traffic[g];
-                    let bound = analysis.access(Source::Traffic(g), &spec.access())?;
-                    (spec.arrivals == Arrivals::Periodic && bound <= spec.period_ns)
-                        .then_some(bound)
-                })
-                .collect();
-            let response = response
-                .iter()
-                .zip(&late)
-                .map(|(r, late)| r.filter(|_| !late))
-                .collect();
+            let bounds =
+                |of: Vec<(Source, Option<Ns>)>| of.into_iter().map(|(_, bound)| bound).collect();
             return Bounds {
                 access,
-                response,
-                traffic,
+                response: bounds(response),
+                traffic: bounds(traffic),
             };
         }
+        // what rested on them has to be looked at again
         analysis.late = late;
     }
 }
@@ -258,7 +269,7 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
         });
         demands.push(Demand {
             master,
-            task: Some(t),
+            source: Some(Source::Task(t)),
             accesses: tenures,
             stream,
         });
@@ -279,7 +290,7 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
             });
             demands.push(Demand {
                 master,
-                task: None,
+                source: None,
                 accesses: vec![look],
                 stream,
             });
@@ -292,15 +303,15 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
         let master = wiring.processors[wire.handler as usize].0;
         let accesses = service_tenures(timing, i);
         let service_ns = accesses.iter().map(|tenure| tenure.total).sum();
-        // served late at most until the next event, which would merge with it
+        // one in service and one pending may be left from before the window
         let stream = spec.ticks.map(|ticks| Stream {
             service_ns,
             period_ns: ticks.period_ns,
-            jitter_ns: ticks.period_ns,
+            jitter_ns: 2 * ticks.period_ns,
         });
         demands.push(Demand {
             master,
-            task: None,
+            source: None,
             accesses,
             stream,
         });
@@ -315,7 +326,7 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
         });
         demands.push(Demand {
             master: wiring.traffic[g].0,
-            task: None,
+            source: Some(Source::Traffic(g)),
             accesses: vec![tenure],
             stream,
         });
@@ -449,7 +460,10 @@ impl Analysis<'_> {
                     if demand.accesses.is_empty() {
                         continue;
                     }
-                    if demand.task.is_some_and(|t| self.late[t]) {
+                    if demand
+                        .source
+                        .is_some_and(|source| self.late.contains(&source))
+                    {
                         return None;
                     }
                     streams.push(demand.stream?);
@@ -568,7 +582,7 @@ impl Analysis<'_> {
             interference.push(Stream {
                 service_ns,
                 period_ns,
-                jitter_ns: period_ns,
+                jitter_ns: 2 * period_ns,
             });
         }
         let mut blocking = 0;

@@ -12,7 +12,7 @@
 
 #![warn(missing_docs)]
 
-// pub mod accounting;
+pub mod accounting;
 pub mod adaptor;
 pub mod analysis;
 pub mod arbiter;

@@ -72,6 +72,13 @@ pub struct Recovered {
     pub gaps: BTreeMap<String, u64>,
 }
 
+impl Recovered {
+    /// True where nothing is missing.
+    pub fn is_complete(&self) -> bool {
+        self.was_complete && self.damaged_chunks == 0 && self.gaps.is_empty()
+    }
+}
+
 impl fmt::Display for Recovered {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let seconds = |ns: Ns| ns as f64 * 1e-9;
@@ -79,7 +86,7 @@ impl fmt::Display for Recovered {
         if let Some(duration) = self.duration {
             write!(f, " of {:.3} s", seconds(duration))?;
         }
-        if self.was_complete && self.damaged_chunks == 0 && self.gaps.is_empty() {
+        if self.is_complete() {
             return write!(f, "; nothing is missing");
         }
         if !self.was_complete {

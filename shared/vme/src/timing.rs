@@ -9,6 +9,7 @@
 //!
 //! [`Op::Decide`]: crate::Op::Decide
 
+mod agenda;
 mod bus;
 mod processor;
 mod task;
@@ -120,7 +121,7 @@ pub struct Timing {
     next_fault: usize,
     now: Ns,
     /// When each of [`Wiring::sources`] has its next event.
-    due: Vec<Ns>,
+    agenda: agenda::Agenda,
     arbiter: Arbiter,
     bus: bus::Bus,
     masters: Vec<Requester>,
@@ -171,18 +172,20 @@ impl Timing {
             .collect();
         fault_times.sort_by_key(|&(at, i, begins)| (at, begins, i));
 
-        let mut due = vec![Ns::MAX; wiring.sources.len()];
-        due[Wiring::FAULT] = fault_times.first().map_or(Ns::MAX, |f| f.0);
+        let mut agenda = agenda::Agenda::new(&wiring);
+        agenda.set(Wiring::FAULT, fault_times.first().map_or(Ns::MAX, |f| f.0));
         for (t, task) in rack.tasks.iter().enumerate() {
             match task.release {
-                Release::Timer => due[wiring.task(t as u16)] = task.offset_ns,
-                Release::Poll(_) => due[wiring.dispatch(wiring.processor_of_task[t])] = 0,
+                Release::Timer => agenda.set(wiring.task(t as u16), task.offset_ns),
+                Release::Poll(_) => agenda.set(wiring.dispatch(wiring.processor_of_task[t]), 0),
                 Release::Interrupt(_) => {}
             }
         }
         for (i, interrupter) in rack.interrupters.iter().enumerate() {
-            due[wiring.interrupter(i as u16)] =
-                interrupter.ticks.map_or(Ns::MAX, |ticks| ticks.at(0));
+            agenda.set(
+                wiring.interrupter(i as u16),
+                interrupter.ticks.map_or(Ns::MAX, |ticks| ticks.at(0)),
+            );
         }
         let generators: Vec<Generator> = (rack.traffic.iter().enumerate())
             .map(|(g, t)| Generator {
@@ -198,7 +201,7 @@ impl Timing {
             })
             .collect();
         for (g, generator) in generators.iter().enumerate() {
-            due[wiring.traffic(g as u16)] = generator.arrivals.next();
+            agenda.set(wiring.traffic(g as u16), generator.arrivals.next());
         }
         Ok(Timing {
             arbiter: Arbiter::new(rack.bus.arbiter),
@@ -221,7 +224,7 @@ impl Timing {
             generators,
             counters: Counters::default(),
             now: 0,
-            due,
+            agenda,
             faults: Arc::new(faults),
             fault_times: fault_times.into(),
             next_fault: 0,
@@ -271,13 +274,7 @@ impl Timing {
     /// later). Gives the sink every transfer whose data moved on the way, in the order of `data_at`.
     pub fn advance(&mut self, limit: Ns, sink: &mut impl Sink) -> Stop {
         loop {
-            let mut next = 0;
-            for i in 1..self.due.len() {
-                if self.due[i] < self.due[next] {
-                    next = i;
-                }
-            }
-            let at = self.due[next];
+            let (at, next) = self.agenda.next();
             if at >= limit {
                 self.now = self.now.max(limit);
                 return Stop::Limit;
@@ -300,7 +297,8 @@ impl Timing {
                 let line = &mut self.lines[i as usize];
                 line.tick += 1;
                 let ticks = self.wiring.rack.interrupters[i as usize].ticks;
-                self.due[due] = ticks.map_or(Ns::MAX, |ticks| ticks.at(line.tick));
+                self.agenda
+                    .set(due, ticks.map_or(Ns::MAX, |ticks| ticks.at(line.tick)));
                 self.raise(i);
             }
             Source::Task(t) => return self.tick(t),
@@ -318,7 +316,7 @@ impl Clone for Timing {
             wiring: self.wiring.clone(),
             faults: self.faults.clone(),
             fault_times: self.fault_times.clone(),
-            due: self.due.clone(),
+            agenda: self.agenda.clone(),
             arbiter: self.arbiter.clone(),
             masters: self.masters.clone(),
             processors: self.processors.clone(),
@@ -335,7 +333,7 @@ impl Clone for Timing {
         self.fault_times.clone_from(&from.fault_times);
         self.next_fault = from.next_fault;
         self.now = from.now;
-        self.due.clone_from(&from.due);
+        self.agenda.clone_from(&from.agenda);
         self.arbiter.clone_from(&from.arbiter);
         self.bus = from.bus;
         self.masters.clone_from(&from.masters);

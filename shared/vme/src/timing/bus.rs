@@ -95,9 +95,11 @@ impl Timing {
     /// Drives BR* for the first transfer of the queue.
     fn ask(&mut self, m: u16) {
         let timer = self.wiring.access_timer(m);
-        self.due[timer] = self
-            .now
-            .saturating_add(self.wiring.rack.bus.access_timer_ns);
+        self.agenda.set(
+            timer,
+            self.now
+                .saturating_add(self.wiring.rack.bus.access_timer_ns),
+        );
         if self
             .faults
             .holds(self.now, FaultKind::Starvation(m))
@@ -112,14 +114,14 @@ impl Timing {
     pub(super) fn wake_arbiter(&mut self) {
         if matches!(self.bus.phase, Phase::Free | Phase::Boundary) {
             let arbiter = self.wiring.arbiter();
-            self.due[arbiter] = self.now;
+            self.agenda.set(arbiter, self.now);
         }
     }
 
     /// The arbiter and the owner's requester settle who has the bus from now on.
     pub(super) fn arbitrate(&mut self) {
         let arbiter = self.wiring.arbiter();
-        self.due[arbiter] = Ns::MAX;
+        self.agenda.set(arbiter, Ns::MAX);
         if self.faults.holds(self.now, FaultKind::StuckBus).is_some() {
             return;
         }
@@ -143,7 +145,7 @@ impl Timing {
             self.bus.phase = Phase::Free;
             if between_bursts {
                 self.ask(owner);
-                self.due[arbiter] = Ns::MAX;
+                self.agenda.set(arbiter, Ns::MAX);
             }
         }
         if let Some(place) = self.arbiter.grant() {
@@ -156,7 +158,7 @@ impl Timing {
     /// The next burst of the owner's first transfer begins at `granted`.
     fn begin(&mut self, m: u16, granted: Ns) {
         let timer = self.wiring.access_timer(m);
-        self.due[timer] = Ns::MAX;
+        self.agenda.set(timer, Ns::MAX);
         let first = self.masters[m as usize].queue[0];
         if !first.begun {
             let plan = self.plan(&first);
@@ -179,12 +181,12 @@ impl Timing {
                 done: granted + burst.done_ns,
                 status: burst.status,
             };
-            self.due[Wiring::BUS] = granted + burst.data_ns;
+            self.agenda.set(Wiring::BUS, granted + burst.data_ns);
         } else {
             self.bus.phase = Phase::Burst {
                 cycles: burst.cycles,
             };
-            self.due[Wiring::BUS] = granted + burst.done_ns;
+            self.agenda.set(Wiring::BUS, granted + burst.done_ns);
         }
     }
 
@@ -262,7 +264,7 @@ impl Timing {
 
     /// The bus is due: the phase that ran is over.
     pub(super) fn bus_event(&mut self, sink: &mut impl Sink) {
-        self.due[Wiring::BUS] = Ns::MAX;
+        self.agenda.set(Wiring::BUS, Ns::MAX);
         let Some(owner) = self.bus.owner else { return };
         match self.bus.phase {
             Phase::Free | Phase::Boundary => {}
@@ -278,7 +280,7 @@ impl Timing {
                 head.transfer.status = status;
                 let (transfer, client) = (head.transfer, head.client);
                 self.bus.phase = Phase::Finishing;
-                self.due[Wiring::BUS] = done;
+                self.agenda.set(Wiring::BUS, done);
                 self.data_moved(&transfer, client);
                 sink.transfer(&transfer);
             }
@@ -323,7 +325,7 @@ impl Timing {
     /// The access timer: the master was not granted the bus and gives up.
     pub(super) fn access_timeout(&mut self, m: u16, sink: &mut impl Sink) {
         let timer = self.wiring.access_timer(m);
-        self.due[timer] = Ns::MAX;
+        self.agenda.set(timer, Ns::MAX);
         let requester = &mut self.masters[m as usize];
         self.arbiter.withdraw(requester.place);
         let mut ended = requester.queue.remove(0);
@@ -365,7 +367,7 @@ impl Timing {
             let spec = &self.wiring.rack.adaptors[adaptor as usize];
             if !generator.set_up {
                 generator.set_up = true;
-                self.due[due] = self.now + spec.dma_setup_ns;
+                self.agenda.set(due, self.now + spec.dma_setup_ns);
                 return;
             }
             generator.set_up = false;
@@ -380,7 +382,7 @@ impl Timing {
                 return;
             }
         }
-        self.due[due] = Ns::MAX;
+        self.agenda.set(due, Ns::MAX);
         let mut transfer = asked(Origin::Traffic, g, master, access, requested);
         let generator = &mut self.generators[g as usize];
         transfer.job = generator.count;
@@ -393,6 +395,6 @@ impl Timing {
         let due = self.wiring.traffic(g);
         let arrivals = &mut self.generators[g as usize].arrivals;
         arrivals.advance();
-        self.due[due] = arrivals.next().max(self.now);
+        self.agenda.set(due, arrivals.next().max(self.now));
     }
 }

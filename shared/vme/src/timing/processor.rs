@@ -96,20 +96,20 @@ impl Timing {
     pub(super) fn reschedule(&mut self, p: u16) {
         if self.processors[p as usize].stalled.is_none() {
             let dispatch = self.wiring.dispatch(p);
-            self.due[dispatch] = self.now;
+            self.agenda.set(dispatch, self.now);
         }
     }
 
     fn stall(&mut self, p: u16, strand: Strand, stall: Stall) {
         self.processors[p as usize].stalled = Some((strand, stall, self.now));
         let due = self.wiring.processor(p);
-        self.due[due] = Ns::MAX;
+        self.agenda.set(due, Ns::MAX);
     }
 
     /// The processor is due: a slice of execution or a stall is over.
     pub(super) fn processor_event(&mut self, p: u16, sink: &mut impl Sink) {
         let due = self.wiring.processor(p);
-        self.due[due] = Ns::MAX;
+        self.agenda.set(due, Ns::MAX);
         if let Some((strand, stall, since)) = self.processors[p as usize].stalled.take() {
             match stall {
                 Stall::Outbound(pending) => {
@@ -141,7 +141,7 @@ impl Timing {
             }
         }
         let dispatch = self.wiring.dispatch(p);
-        self.due[dispatch] = self.now;
+        self.agenda.set(dispatch, self.now);
     }
 
     /// Takes off what runs, and notes how far it got.
@@ -162,13 +162,13 @@ impl Timing {
             }
         }
         let due = self.wiring.processor(p);
-        self.due[due] = Ns::MAX;
+        self.agenda.set(due, Ns::MAX);
     }
 
     /// The processor chooses what to do from this instant on.
     pub(super) fn dispatch(&mut self, p: u16, sink: &mut impl Sink) -> Option<Stop> {
         let dispatch = self.wiring.dispatch(p);
-        self.due[dispatch] = Ns::MAX;
+        self.agenda.set(dispatch, Ns::MAX);
         if self.processors[p as usize].stalled.is_some() {
             return None;
         }
@@ -267,7 +267,7 @@ impl Timing {
             Step::Latency if service.remaining > 0 => {
                 self.processors[p as usize].running = Some((Strand::Service, self.now));
                 let due = self.wiring.processor(p);
-                self.due[due] = self.now + service.remaining;
+                self.agenda.set(due, self.now + service.remaining);
                 Next::Waits
             }
             Step::Latency => {
@@ -373,7 +373,7 @@ impl Timing {
         if task.remaining > 0 {
             processor.running = Some((Strand::Task(t), self.now));
             let due = self.wiring.processor(p);
-            self.due[due] = self.now + task.remaining;
+            self.agenda.set(due, self.now + task.remaining);
             return Next::Waits;
         }
         match task.state {
@@ -479,7 +479,7 @@ impl Timing {
         };
         self.stall(p, strand, stall);
         let due = self.wiring.processor(p);
-        self.due[due] = self.now + after;
+        self.agenda.set(due, self.now + after);
     }
 
     /// The bus has done with the access that stalls this processor.
@@ -499,7 +499,7 @@ impl Timing {
             *stall = Stall::Ended(transfer.status);
         }
         let due = self.wiring.processor(p);
-        self.due[due] = self.now + stall_ns;
+        self.agenda.set(due, self.now + stall_ns);
     }
 
     /// The stall is over; an access that failed may be tried again.
@@ -549,7 +549,7 @@ impl Timing {
         }
         if let Some((_, Stall::Buffer, _)) = processor.stalled {
             let due = self.wiring.processor(p);
-            self.due[due] = self.now;
+            self.agenda.set(due, self.now);
         } else if status != Status::Ok {
             self.reschedule(p);
         }

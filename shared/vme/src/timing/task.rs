@@ -193,7 +193,8 @@ impl Timing {
         let task = &mut self.tasks[t as usize];
         let job = task.tick as u32;
         task.tick += 1;
-        self.due[due] = self.wiring.ticks[t as usize].at(task.tick);
+        self.agenda
+            .set(due, self.wiring.ticks[t as usize].at(task.tick));
         self.release_task(t, job)
     }
 
@@ -255,10 +256,12 @@ impl Timing {
         let mut stop = None;
         let (at, i, begins) = self.fault_times[self.next_fault];
         self.next_fault += 1;
-        self.due[super::Wiring::FAULT] = self
-            .fault_times
-            .get(self.next_fault)
-            .map_or(Ns::MAX, |f| f.0);
+        self.agenda.set(
+            super::Wiring::FAULT,
+            self.fault_times
+                .get(self.next_fault)
+                .map_or(Ns::MAX, |f| f.0),
+        );
         debug_assert_eq!(at, self.now);
         let kind = self.faults.faults[i as usize].kind;
         if begins {

@@ -1,1 +1,12 @@
-//! chassis
+//! The chassis: powers the boards up, is the rack's system controller, and is the `vmerack` command.
+//!
+//! * [`commands`]: one file per subcommand; [`cli`] is their list.
+//! * [`rack_run`]: one variant of a scenario from power-up to the last window.
+//! * [`boards`]: the built-in board of every role.
+
+#![warn(missing_docs)]
+
+pub mod boards;
+pub mod cli;
+pub mod commands;
+pub mod rack_run;

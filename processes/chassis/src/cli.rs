@@ -1,0 +1,63 @@
+//! The `vmerack` command: results to standard output, everything else to standard error.
+//!
+//! Exit codes: 0 passed, 1 failure, 2 usage or bad scenario, 3 finished with losses, 4 an acceptance limit violated.
+
+use crate::{boards, commands};
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// The VME rack of a force-controlled seven-joint arm, as processes with modelled bus latency.
+#[derive(Debug, Parser)]
+#[command(version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Run(commands::run::RunArgs),
+    Scenarios(commands::scenarios::ScenariosArgs),
+    Scenario(commands::scenario::ScenarioArgs),
+    //Log(commands::log::LogArgs),
+    Arm(commands::arm::ArmArgs),
+    Bus(commands::bus::BusArgs),
+    Design(commands::design::DesignArgs),
+    /// Hosts the boards of one process; `vmerack run` starts it.
+    #[command(hide = true)]
+    Host {
+        /// Run folder.
+        #[arg(long)]
+        run: String,
+        /// Process.
+        #[arg(long)]
+        process: String,
+    },
+}
+
+/// Runs the command that the command line names.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    if let Command::Host { .. } = cli.command {
+        return pacing::serve(&boards::build);
+    }
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let outcome = match cli.command {
+        Command::Run(args) => commands::run::run(args),
+        Command::Scenarios(args) => commands::scenarios::run(args),
+        Command::Scenario(args) => commands::scenario::run(args),
+        //Command::Log(args) => commands::log::run(args),
+        Command::Arm(args) => commands::arm::run(args),
+        Command::Bus(args) => commands::bus::run(args),
+        Command::Design(args) => commands::design::run(args),
+        Command::Host { .. } => Ok(0),
+    };
+    match outcome {
+        Ok(code) => ExitCode::from(code),
+        Err(report) => {
+            eprintln!("{report:?}");
+            ExitCode::from(if report.downcast_ref::<scenario::ScenarioError>().is_some() { 2 } else { 1 })
+        }
+    }
+}

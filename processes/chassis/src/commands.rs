@@ -1,0 +1,9 @@
+//! One file per subcommand: arguments there, work in the libraries, rendering apart from both.
+
+pub mod arm;
+pub mod bus;
+pub mod design;
+//pub mod log;
+pub mod run;
+pub mod scenario;
+pub mod scenarios;

@@ -1,0 +1,46 @@
+//! `vmerack scenario`: check a scenario, or show it resolved.
+
+use clap::{Args, Subcommand};
+use miette::IntoDiagnostic;
+
+/// Check a scenario, or show it resolved.
+#[derive(Debug, Args)]
+pub struct ScenarioArgs {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Validate a scenario with all its variants.
+    Check {
+        /// A built-in scenario or a file.
+        scenario: String,
+    },
+    /// Print a scenario as TOML, defaults included.
+    Show {
+        /// A built-in scenario or a file.
+        scenario: String,
+    },
+}
+
+/// Runs the command and returns its exit code.
+pub fn run(args: ScenarioArgs) -> miette::Result<u8> {
+    match args.command {
+        Command::Check { scenario } => {
+            let document = scenario::load(&scenario, &[])?;
+            let variants = document.variants()?;
+            for (variant, resolved) in &variants {
+                for warning in scenario::warnings(resolved) {
+                    eprintln!("warning: variant {}: {warning}", variant.name);
+                }
+            }
+            println!("{scenario}: ok, {} variant(s), {:.1} s each", variants.len(), document.scenario()?.duration());
+            Ok(0)
+        }
+        Command::Show { scenario } => {
+            print!("{}", toml::to_string(&scenario::load(&scenario, &[])?.scenario()?).into_diagnostic()?);
+            Ok(0)
+        }
+    }
+}

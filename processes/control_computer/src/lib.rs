@@ -1,1 +1,44 @@
-//! control_computer
+//! The control computer of the rack: two processor cards that run the augmented hybrid impedance control (AHIC) of Patel
+//! and Shadpey, *Control of Redundant Robot Manipulators*, chapters 5 and 6, as one job a period.
+//!
+//! | file | subject |
+//! |---|---|
+//! | `pipeline` | one job: Figure 5.18 from F_e and X to torques |
+//! | `law` | TG → AHIC → ERC → RR |
+//! | `trajectory` | TG: segments, X_d |
+//! | `ahic`, `target` | Ẍᵗ, and Xᵗ integrated from it |
+//! | `erc` | error reference controller |
+//! | `redundancy`, `joint_limits`, `cholesky` | RR and its additional task |
+//! | `inverse_dynamics` | torques, friction feed-forward, saturation |
+//! | `tool`, `frame` | F_e from the sensor's wrench; the task frame |
+//! | `sensors`, `program`, `board` | registers, bus program, the board |
+//! | `commands`, `safety` | what is refused, what stops the arm |
+
+mod ahic;
+mod board;
+mod cholesky;
+mod commands;
+mod erc;
+mod frame;
+mod inverse_dynamics;
+mod joint_limits;
+mod law;
+mod pipeline;
+mod program;
+mod redundancy;
+mod safety;
+mod sensors;
+mod target;
+mod tool;
+mod trajectory;
+
+pub use ahic::Impedance;
+pub use board::ControlComputer;
+pub use commands::Refusal;
+pub use frame::Motion;
+pub use law::Decided;
+pub use pipeline::{BRAKING, Job, Mode, Pipeline};
+pub use safety::State;
+pub use sensors::Sensed;
+pub use tool::Contact;
+pub use trajectory::{QUEUE, Segment, Trajectory};

@@ -1,0 +1,321 @@
+//! The control computer as a board: registers in, one control job, registers out.
+//!
+//! Everything that depends on the bus is here: which read answers what, when a command has arrived, what the dual-ported
+//! RAM shows at which instant. A read that ends in BERR* leaves its word out; the sensors then hold the last value. A job
+//! allocates nothing unless the list of its writes changes.
+
+use crate::commands::{self, Refusal};
+use crate::frame::quaternion_wxyz;
+use crate::pipeline::{Job, Mode, Pipeline};
+use crate::program::{BusProgram, Rest};
+use crate::safety::{Safety, Signs, State};
+use crate::sensors::Sensors;
+use arm::JointVector;
+use board::{Board, Inputs, Outputs};
+use messages::{
+    Command, CommandKind, ControlProbe, Event, EventKind, JOINTS, Severity, Telemetry,
+    TransferRecord, limits,
+};
+use scenario::Scenario;
+use vme::Ns;
+
+/// Commands that can be on their way at once.
+const ON_THE_WAY: usize = 64;
+/// Segment number before the first.
+const NO_SEGMENT: u32 = u32::MAX;
+
+/// Two processor cards: TG, AHIC, ERC, RR, inverse dynamics, safety.
+pub struct ControlComputer {
+    task: u16,
+    period_ns: Ns,
+    program: BusProgram,
+    sensors: Sensors,
+    pipeline: Pipeline,
+    safety: Safety,
+    converters: Converters,
+    /// Own clock at the last job.
+    last: Option<Ns>,
+    /// What the last job did after its decision.
+    rest: Option<Rest>,
+    finite: bool,
+    /// Commands posted whose write has not been carried out yet.
+    on_the_way: Vec<Command>,
+    /// Epoch of the last command judged.
+    epoch: u32,
+    hold: bool,
+    acknowledge: bool,
+    segment: u32,
+    target_limited: u32,
+    torque_limited: u32,
+    /// State blocks of the last two jobs: the older one shows until the newer is written.
+    telemetry: [Telemetry; 2],
+}
+
+/// D/A converters: from torque to code.
+struct Converters {
+    nm_per_v: JointVector,
+    bits: u32,
+}
+
+impl Converters {
+    /// Offset binary over ±10 V.
+    fn code(&self, joint: usize, torque: f64) -> u32 {
+        let half = 2f64.powi(self.bits as i32 - 1);
+        let steps = (torque / self.nm_per_v[joint] / 10.0 * half).round();
+        (steps + half).clamp(0.0, 2.0 * half - 1.0) as u32
+    }
+}
+
+impl ControlComputer {
+    /// The control computer of this scenario. The message says what is wrong with rack, arm or drives.
+    pub fn new(scenario: &Scenario) -> Result<ControlComputer, String> {
+        let task = scenario
+            .task_of("control_computer")
+            .ok_or("the rack has no task of the board `control_computer`")?;
+        let nothing = Telemetry {
+            t: 0,
+            written: 0,
+            epoch: 0,
+            segment: NO_SEGMENT,
+            state: State::Run as u32,
+            heartbeat: 0,
+            position: [0.0; 3],
+            wrench: [0.0; 6],
+        };
+        Ok(ControlComputer {
+            task,
+            period_ns: scenario.rack.tasks[usize::from(task)].period_ns,
+            program: BusProgram::new(scenario)?,
+            sensors: Sensors::new(scenario)?,
+            pipeline: Pipeline::new(scenario)?,
+            safety: Safety::new(),
+            converters: Converters {
+                nm_per_v: scenario.drives()?.each(|drive| drive.amplifier_nm_per_v),
+                bits: scenario.da_io.bits.into(),
+            },
+            last: None,
+            rest: None,
+            finite: true,
+            on_the_way: Vec::with_capacity(ON_THE_WAY),
+            epoch: 0,
+            hold: false,
+            acknowledge: false,
+            segment: NO_SEGMENT,
+            target_limited: 0,
+            torque_limited: 0,
+            telemetry: [nothing; 2],
+        })
+    }
+
+    /// A transfer made to this board's dual-ported RAM.
+    fn served(&mut self, transfer: &TransferRecord, out: &mut Outputs) {
+        let end = transfer.addr + transfer.n * transfer.access().width.bytes();
+        if transfer.is_read() {
+            if transfer.addr == self.program.telemetry && transfer.is_ok() {
+                let [older, newer] = &self.telemetry;
+                let shown = if newer.written <= transfer.data_at { newer } else { older };
+                out.mail.telemetry.push(Telemetry { t: transfer.data_at, ..*shown });
+            }
+        } else if end == self.program.command + size_of::<Command>() as u32
+            && !self.on_the_way.is_empty()
+        {
+            // the last word of a command block; one whose write failed is lost, and its epoch will be missed
+            let command = self.on_the_way.remove(0);
+            if transfer.is_ok() {
+                if let Err(refusal) = self.judge(&command) {
+                    let (epoch, reason) = (command.epoch.into(), f64::from(refusal as u32));
+                    let kind = EventKind::CommandRefused;
+                    let event = Event::new(transfer.data_at, kind, Severity::Warn, epoch, reason);
+                    out.mail.events.push(event);
+                }
+            }
+        }
+    }
+
+    fn judge(&mut self, command: &Command) -> Result<(), Refusal> {
+        if command.epoch != self.epoch + 1 {
+            return Err(Refusal::Epoch);
+        }
+        self.epoch = command.epoch;
+        match command.kind {
+            kind if kind == CommandKind::Segment as u32 => {
+                let segment = commands::segment(command)?;
+                let trajectory = self.pipeline.trajectory();
+                if self.hold || self.safety.state() > State::Degraded {
+                    return Err(Refusal::State);
+                }
+                if segment.start < trajectory.last_start() {
+                    return Err(Refusal::Times);
+                }
+                if !trajectory.has_room() {
+                    return Err(Refusal::QueueFull);
+                }
+                trajectory.push(segment);
+            }
+            kind if kind == CommandKind::Hold as u32 => self.hold = true,
+            kind if kind == CommandKind::Acknowledge as u32 => self.acknowledge = true,
+            _ => return Err(Refusal::Kind),
+        }
+        Ok(())
+    }
+
+    /// One control job at its decision, at `t` of simulated time and `now` of this board's clock.
+    fn job(&mut self, job: u32, t: Ns, now: Ns, out: &mut Outputs) {
+        if let Some(read) = self.sensors.read(job) {
+            let address = self.program.read_address(read).into();
+            let severity = Severity::Warn;
+            out.mail.events.push(Event::new(t, EventKind::BusError, severity, job.into(), address));
+        }
+        let state = self.decide_state(t, now, out);
+        let mode = match state {
+            State::Run | State::Degraded | State::Hold => Mode::Law,
+            State::Stop => Mode::Brake,
+            State::Off => Mode::Free,
+        };
+        let since = self.last.map_or(self.period_ns, |last| now.saturating_sub(last).max(1));
+        self.last = Some(now);
+        let done = self.pipeline.step(now, since as f64 * 1e-9, self.sensors.sensed(), mode);
+        self.finite = done.torque.iter().all(|torque| torque.is_finite());
+        let rest = match self.rest {
+            _ if mode == Mode::Free || !self.finite => Rest::Stop,
+            None | Some(Rest::Stop) => Rest::Start,
+            _ => Rest::Run,
+        };
+        let codes: [u32; JOINTS] = std::array::from_fn(|joint| {
+            let torque = if rest == Rest::Stop { 0.0 } else { done.torque[joint] };
+            self.converters.code(joint, torque)
+        });
+        if self.rest != Some(rest) {
+            out.rest = Some(self.program.after_decision(rest));
+            self.rest = Some(rest);
+        }
+        self.program.words(rest, self.task, job, &codes, &mut out.mail.words);
+        self.tell(t, &done, out);
+        out.mail.control_probe.push(self.probe(t, job, state, &done));
+        let written = t + self.program.execution_ns(rest);
+        self.telemetry = [
+            self.telemetry[1],
+            Telemetry {
+                t,
+                written,
+                epoch: self.epoch,
+                segment: self.segment,
+                state: state as u32,
+                heartbeat: job,
+                position: done.x.p.into(),
+                wrench: done.contact.fe.into(),
+            },
+        ];
+    }
+
+    fn decide_state(&mut self, t: Ns, now: Ns, out: &mut Outputs) -> State {
+        let before = self.safety.state();
+        let state = self.safety.decide(
+            now,
+            &Signs {
+                drive_status: self.sensors.status(),
+                held_jobs: self.sensors.held_jobs(),
+                speed: self.sensors.sensed().qd.amax(),
+                finite: self.finite,
+                hold: self.hold,
+                acknowledge: self.acknowledge,
+            },
+        );
+        (self.hold, self.acknowledge) = (false, false);
+        if state != before {
+            let severity = match state {
+                State::Run => Severity::Ok,
+                State::Degraded | State::Hold => Severity::Warn,
+                State::Stop | State::Off => Severity::Error,
+            };
+            let (from, to) = (f64::from(before as u32), f64::from(state as u32));
+            out.mail.events.push(Event::new(t, EventKind::SafetyState, severity, from, to));
+            if state == State::Hold {
+                self.pipeline.hold(self.sensors.sensed());
+            }
+        }
+        state
+    }
+
+    /// Events of a job: what began or ceased in it.
+    fn tell(&mut self, t: Ns, job: &Job, out: &mut Outputs) {
+        let segment = job.law.segment.unwrap_or(NO_SEGMENT);
+        if segment != self.segment && segment != NO_SEGMENT {
+            let kind = EventKind::SegmentStart;
+            out.mail.events.push(Event::new(t, kind, Severity::Ok, segment.into(), 0.0));
+        }
+        self.segment = segment;
+        if let Some(offset) = job.contact.tared {
+            out.mail.events.push(Event::new(t, EventKind::Tare, Severity::Ok, offset[2], 0.0));
+        }
+        let mut edges = |kind, before: u32, after: u32| {
+            for bit in (0..32).filter(|bit| (before ^ after) >> bit & 1 == 1) {
+                let begins = after >> bit & 1;
+                let severity = if begins == 1 { Severity::Warn } else { Severity::Ok };
+                let event = Event::new(t, kind, severity, begins.into(), bit.into());
+                out.mail.events.push(event);
+            }
+        };
+        edges(EventKind::TargetErrorLimit, self.target_limited, job.law.target_limited);
+        edges(EventKind::TorqueLimit, self.torque_limited, job.torque_limited);
+        self.target_limited = job.law.target_limited;
+        self.torque_limited = job.torque_limited;
+    }
+
+    fn probe(&self, t: Ns, job: u32, state: State, done: &Job) -> ControlProbe {
+        let sensed = self.sensors.sensed();
+        let Job { x, x_dot, law, .. } = done;
+        let bit = |acted: bool, bit: u32| if acted { bit } else { 0 };
+        ControlProbe {
+            t,
+            job,
+            segment: self.segment,
+            state: state as u32,
+            limits: bit(law.target_limited != 0, limits::TARGET_ERROR)
+                | bit(done.torque_limited != 0, limits::TORQUE)
+                | bit(law.near_joint_limit, limits::JOINT_LIMIT),
+            force_age: self.sensors.force_age(t),
+            encoder_age: self.sensors.encoder_age(t),
+            q: sensed.q.into(),
+            qd: sensed.qd.into(),
+            qdd: law.qdd.into(),
+            torque: done.torque.into(),
+            x: x.p.into(),
+            x_orientation: quaternion_wxyz(&x.r),
+            x_dot: (*x_dot).into(),
+            xt: law.xt.pose.p.into(),
+            xt_orientation: quaternion_wxyz(&law.xt.pose.r),
+            xt_dot: law.xt.twist.into(),
+            xt_ddot: law.xt.acceleration.into(),
+            xd: law.xd.pose.p.into(),
+            xd_orientation: quaternion_wxyz(&law.xd.pose.r),
+            xr_ddot: law.xr_ddot.into(),
+            fe: done.contact.fe.into(),
+            fd: law.fd.into(),
+        }
+    }
+}
+
+impl Board for ControlComputer {
+    fn step(&mut self, now: Ns, inputs: &Inputs, out: &mut Outputs) {
+        if inputs.boot {
+            out.program = Some((self.task, self.program.until_decision()));
+        }
+        for word in inputs.mail.words.iter().filter(|word| word.task == self.task) {
+            self.sensors.take(word);
+        }
+        for command in &inputs.mail.commands {
+            if self.on_the_way.len() == ON_THE_WAY {
+                // its write never came: the workstation stopped half-way
+                self.on_the_way.remove(0);
+            }
+            self.on_the_way.push(*command);
+        }
+        for transfer in &inputs.transfers {
+            self.served(transfer, out);
+        }
+        if let Some(decision) = inputs.decision.filter(|decision| decision.task == self.task) {
+            self.job(decision.job, inputs.until, now, out);
+        }
+    }
+}

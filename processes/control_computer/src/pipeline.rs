@@ -1,0 +1,132 @@
+//! The control pipeline of Figure 5.18: TG → AHIC → ERC → RR → inverse dynamics, with forward kinematics feeding X back.
+//!
+//! One [`Pipeline::step`] is one control job, apart from everything that has to do with the bus. It cannot fail; sensor
+//! values that are no numbers give torques that are none, which the safety state machine sees.
+
+use crate::frame::TaskFrame;
+use crate::inverse_dynamics::{Drives, contact_torque, motion_torque};
+use crate::law::{Decided, Law};
+use crate::sensors::Sensed;
+use crate::tool::{Contact, ToolCompensation};
+use crate::trajectory::Trajectory;
+use arm::{ArmModel, ArmState, JointVector, Pose, Spatial};
+use nalgebra::Vector3;
+use scenario::Scenario;
+use vme::Ns;
+
+/// What governs the joints in a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// The law.
+    Law,
+    /// Motors brake the joints: q̈ = −q̇ · [`BRAKING`] (SS1).
+    Brake,
+    /// Nothing: no torque (STO).
+    Free,
+}
+
+/// Rate at which braked joints lose their speed (1/s).
+pub const BRAKING: f64 = 20.0;
+
+/// Everything that a job knew and decided; poses, twists and wrenches in the task frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Job {
+    /// X.
+    pub x: Pose,
+    /// Ẋ (m/s, rad/s).
+    pub x_dot: Spatial,
+    /// F_e, and the tare.
+    pub contact: Contact,
+    /// What the law decided.
+    pub law: Decided,
+    /// Torques after limits (Nm).
+    pub torque: JointVector,
+    /// Joints whose torque was cut, a bit each.
+    pub torque_limited: u32,
+}
+
+/// The pipeline and what it keeps from job to job.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    arm: ArmModel,
+    frame: TaskFrame,
+    tool: ToolCompensation,
+    law: Law,
+    drives: Drives,
+    force_feed_forward: bool,
+}
+
+impl Pipeline {
+    /// The pipeline of this scenario's controller. The message says what is wrong with the arm or its drives.
+    pub fn new(scenario: &Scenario) -> Result<Pipeline, String> {
+        let arm = scenario.controller_arm()?;
+        let frame = TaskFrame::new(&scenario.task_frame());
+        let controller = &scenario.controller;
+        let tool = controller.tool.as_ref().unwrap_or(&scenario.arm.tool);
+        let known = (tool.mass_kg, Vector3::from(tool.com_m));
+        let tare = scenario::nanoseconds(controller.tare_ms * 1e-3);
+        Ok(Pipeline {
+            tool: ToolCompensation::new(
+                controller.tool_compensation.then_some(known),
+                controller.tool_inertia_compensation,
+                Vector3::from(scenario.arm.sensor_m),
+                &frame,
+                &arm.gravity(),
+                (tare > 0).then_some(tare),
+            ),
+            frame,
+            law: Law::new(scenario, &arm),
+            drives: Drives::new(&scenario.drives()?, controller.friction_compensation),
+            force_feed_forward: controller.force_feed_forward,
+            arm,
+        })
+    }
+
+    /// TG, for the segments that commands bring.
+    pub fn trajectory(&mut self) -> &mut Trajectory {
+        self.law.trajectory()
+    }
+
+    /// Ends the segment in force and those that wait: X_d rests where the tool is.
+    pub fn hold(&mut self, sensed: &Sensed) {
+        let x = arm::forward_kinematics(&self.arm, &sensed.q);
+        self.law.hold(self.frame.pose(&x));
+    }
+
+    /// One job at `now`, `dt` seconds after the last one.
+    pub fn step(&mut self, now: Ns, dt: f64, sensed: &Sensed, mode: Mode) -> Job {
+        let arm = ArmState::new(&self.arm, &sensed.q, &sensed.qd);
+        let tool = self.frame.kinematics(&arm.tip_motion());
+        let contact = (self.tool).contact(&sensed.wrench, &tool.pose, &tool.twist, now, dt);
+        let mut job = Job {
+            x: tool.pose,
+            x_dot: tool.twist,
+            contact,
+            law: Decided::nothing(tool.pose),
+            torque: JointVector::zeros(),
+            torque_limited: 0,
+        };
+        match mode {
+            Mode::Law => {
+                job.law = self.law.decide(now, sensed, &tool, &contact.fe);
+                job.torque = motion_torque(&arm, &self.drives, &job.law.qdd)
+                    + self.drives.friction(&job.law.target_speed);
+                if self.force_feed_forward {
+                    job.torque += contact_torque(&tool, &contact.fe);
+                }
+            }
+            Mode::Brake => {
+                job.law.qdd = sensed.qd * -BRAKING;
+                job.torque = motion_torque(&arm, &self.drives, &job.law.qdd);
+            }
+            Mode::Free => {}
+        }
+        job.torque_limited = self.drives.saturate(&mut job.torque);
+        if mode == Mode::Law {
+            (self.law).carry_on(&job.law, &tool, job.torque_limited != 0, dt);
+        } else {
+            self.law.leave();
+        }
+        job
+    }
+}

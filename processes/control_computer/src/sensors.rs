@@ -1,0 +1,332 @@
+//! From register contents to joint angles, speeds and the sensor's wrench.
+//!
+//! Counters wrap: they are unwrapped from job to job, starting from the posture that homing has left. A word that does not
+//! come (BERR*), or force words under an error of the receiver, leave the last value in place; how many jobs in a row a
+//! value has been held is counted, and the safety state machine decides what that means.
+
+use crate::program::{COUNTER, COUNTS, ERRORS, FORCES, READS, STATUS, is_wide};
+use arm::{JointVector, Spatial};
+use messages::registers::{encoder, force};
+use messages::{BusWord, JOINTS};
+use scenario::{ForceFilter, Scenario};
+use vme::Ns;
+
+/// Errors of the receiver under which its force words mean nothing.
+const FORCE_INVALID: u32 = (force::ERROR_MEMORY
+    | force::ERROR_SENSOR_CHANGE
+    | force::ERROR_BUSY
+    | force::ERROR_CRC
+    | force::ERROR_WATCHDOG) as u32;
+
+/// What a job knows of the arm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensed {
+    /// Motor-side joint angles θ/N (rad).
+    pub q: JointVector,
+    /// Motor-side joint speeds (rad/s).
+    pub qd: JointVector,
+    /// Wrench at the sensor, sensor axes, moment about its origin (N, Nm).
+    pub wrench: Spatial,
+}
+
+/// Registers of all sensors, as far as the jobs have read them.
+#[derive(Clone, Debug)]
+pub struct Sensors {
+    /// Words of the job under way.
+    words: [BusWord; READS],
+    /// Bit i: word i came in this job.
+    came: u32,
+    job: u32,
+    /// Jobs in a row in which word i did not come.
+    held: [u32; READS],
+    /// Unwrapped counts.
+    counts: [i64; JOINTS],
+    counts_at: [Ns; JOINTS],
+    counter_bits: u32,
+    counts_per_rad: JointVector,
+    sensed: Sensed,
+    force_scale: Spatial,
+    wide_force: bool,
+    force_period_ns: u64,
+    force_published: Ns,
+    status: u32,
+}
+
+impl Sensors {
+    /// Sensors of an arm at its initial posture.
+    pub fn new(scenario: &Scenario) -> Result<Sensors, String> {
+        let drives = scenario.drives()?;
+        let counts_per_rad = drives.each(|drive| drive.counts_per_rad());
+        let posture = scenario.initial_posture()?;
+        let receiver = &scenario.force_sensor_if;
+        let force_period_ns = match receiver.filter {
+            ForceFilter::Cascade(n) => 125_000 << (2 * u32::from(n)),
+            ForceFilter::DelayMs(_) => 125_000,
+        };
+        let full_scale = Spatial::from_fn(|axis, _| {
+            if axis < 3 {
+                receiver.full_scale_n
+            } else {
+                receiver.full_scale_nm
+            }
+        });
+        Ok(Sensors {
+            words: [BusWord {
+                t: 0,
+                addr: 0,
+                value: 0,
+                job: 0,
+                task: 0,
+                index: 0,
+            }; READS],
+            came: 0,
+            job: 0,
+            held: [0; READS],
+            counts: std::array::from_fn(|i| (posture[i] * counts_per_rad[i]).floor() as i64),
+            counts_at: [0; JOINTS],
+            counter_bits: scenario.encoder_if.counter_bits.into(),
+            counts_per_rad,
+            sensed: Sensed {
+                q: posture,
+                qd: JointVector::zeros(),
+                wrench: Spatial::zeros(),
+            },
+            force_scale: full_scale / receiver.full_scale_counts,
+            wide_force: is_wide(scenario),
+            force_period_ns,
+            force_published: 0,
+            status: 0,
+        })
+    }
+
+    /// Takes the answer to a read of a job; answers of another job empty the block first.
+    pub fn take(&mut self, word: &BusWord) {
+        let index = usize::from(word.index);
+        if index >= READS {
+            return;
+        }
+        if word.job != self.job {
+            self.job = word.job;
+            self.came = 0;
+        }
+        self.words[index] = *word;
+        self.came |= 1 << index;
+    }
+
+    /// Decodes the words of `job`. Returns the first read that has just failed, if any.
+    pub fn read(&mut self, job: u32) -> Option<usize> {
+        if self.job != job {
+            self.came = 0;
+        }
+        let mut failed = None;
+        for (index, held) in self.held.iter_mut().enumerate() {
+            if self.came & (1 << index) != 0 {
+                *held = 0;
+            } else {
+                *held += 1;
+                if *held == 1 {
+                    failed = failed.or(Some(index));
+                }
+            }
+        }
+        for joint in 0..JOINTS {
+            self.read_encoder(joint);
+        }
+        self.read_force();
+        if self.has(STATUS) {
+            self.status = self.words[STATUS].value;
+        }
+        self.came = 0;
+        failed
+    }
+
+    /// Angles, speeds and wrench after the last [`Sensors::read`].
+    pub fn sensed(&self) -> &Sensed {
+        &self.sensed
+    }
+
+    /// Bits of [`messages::drive_status`].
+    pub fn status(&self) -> u32 {
+        self.status
+    }
+
+    /// Jobs in a row in which the worst value has been held.
+    pub fn held_jobs(&self) -> u32 {
+        self.held.iter().copied().max().unwrap_or(0)
+    }
+
+    /// Age of the force sample at `now`: since its filter's output was published. The receiver's counter numbers the
+    /// multiples of the filter's period, modulo 2¹⁶; behind a pure delay it numbers the samples that come out.
+    pub fn force_age(&self, now: Ns) -> Ns {
+        now.saturating_sub(self.force_published)
+    }
+
+    /// Age of the oldest count at `now`.
+    pub fn encoder_age(&self, now: Ns) -> Ns {
+        now.saturating_sub(self.counts_at.into_iter().min().unwrap_or(0))
+    }
+
+    fn has(&self, index: usize) -> bool {
+        self.came & (1 << index) != 0
+    }
+
+    fn read_encoder(&mut self, joint: usize) {
+        let at = COUNTS + 2 * joint;
+        if self.has(at) {
+            let word = &self.words[at];
+            let unused = 32 - self.counter_bits;
+            // difference to the last reading, sign-extended from the counter's width
+            let turned = (word.value.wrapping_sub(self.counts[joint] as u32) << unused) as i32;
+            self.counts[joint] += i64::from(turned >> unused);
+            self.counts_at[joint] = word.t;
+            self.sensed.q[joint] = self.counts[joint] as f64 / self.counts_per_rad[joint];
+        }
+        if self.has(at + 1) {
+            let counts_per_s = f64::from(self.words[at + 1].value as i32) * encoder::VELOCITY_LSB;
+            self.sensed.qd[joint] = counts_per_s / self.counts_per_rad[joint];
+        }
+    }
+
+    fn read_force(&mut self) {
+        let invalid = self.has(ERRORS) && self.words[ERRORS].value & FORCE_INVALID != 0;
+        for axis in 0..6 {
+            let at = FORCES + axis;
+            if invalid {
+                self.held[at] = self.held[at].max(self.held[ERRORS]) + 1;
+            } else if self.has(at) {
+                let value = self.words[at].value;
+                let counts = if self.wide_force {
+                    f64::from(value as i32)
+                } else {
+                    f64::from(value as u16 as i16)
+                };
+                self.sensed.wrench[axis] = counts * self.force_scale[axis];
+            }
+        }
+        if self.has(COUNTER) {
+            let word = &self.words[COUNTER];
+            let newest = word.t / self.force_period_ns;
+            let lag = (newest as u16).wrapping_sub(word.value as u16);
+            self.force_published = newest.saturating_sub(lag.into()) * self.force_period_ns;
+        }
+    }
+}
+
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scenario(overrides: &[&str]) -> Scenario {
+        let overrides: Vec<String> = overrides.iter().map(|o| o.to_string()).collect();
+        scenario::load("table-5-3", &overrides).unwrap().scenario().unwrap()
+    }
+
+    fn word(job: u32, index: usize, value: u32, t: Ns) -> BusWord {
+        BusWord { t, addr: 0, value, job, task: 0, index: index as u16 }
+    }
+
+    /// All words of a job: these counts, zero elsewhere.
+    fn give(sensors: &mut Sensors, job: u32, counts: [i64; JOINTS], t: Ns) {
+        for index in 0..READS {
+            let value = match index {
+                i if i < FORCES && i % 2 == 0 => {
+                    // sign-extended from 24 bits, as the card shows it
+                    ((counts[i / 2] as i32) << 8 >> 8) as u32
+                }
+                _ => 0,
+            };
+            sensors.take(&word(job, index, value, t));
+        }
+    }
+
+    #[test]
+    fn counters_are_unwrapped_both_ways_from_the_posture_that_homing_left() {
+        let scenario = scenario(&[]);
+        let mut sensors = Sensors::new(&scenario).unwrap();
+        let mut counts = sensors.counts;
+        // 24 bits wrap every 2²⁴ counts: go round twice forwards, then back
+        for job in 0..100 {
+            let way = if job < 50 { 700_000 } else { -1_400_000 };
+            counts = counts.map(|count| count + way);
+            give(&mut sensors, job, counts, 1000);
+            assert_eq!(sensors.read(job), None);
+            for joint in 0..JOINTS {
+                let q = counts[joint] as f64 / sensors.counts_per_rad[joint];
+                assert_eq!(sensors.sensed().q[joint], q);
+            }
+        }
+        assert!(counts[0] < -(1 << 24));
+    }
+
+    #[test]
+    fn speeds_and_forces_are_scaled_and_keep_their_sign() {
+        let scenario = scenario(&[]);
+        let mut sensors = Sensors::new(&scenario).unwrap();
+        let counts = sensors.counts;
+        give(&mut sensors, 0, counts, 0);
+        sensors.take(&word(0, COUNTS + 3, (-2048i32) as u32, 0));
+        sensors.take(&word(0, FORCES + 2, u32::from((-8192i16) as u16), 0));
+        sensors.take(&word(0, FORCES + 5, 4096, 0));
+        sensors.read(0);
+        let sensed = sensors.sensed();
+        assert_eq!(sensed.qd[1], -2.0 / sensors.counts_per_rad[1]);
+        // full scales 400 N and 40 Nm at 16384 counts
+        assert_eq!((sensed.wrench[2], sensed.wrench[5]), (-200.0, 10.0));
+    }
+
+    #[test]
+    fn a_word_that_does_not_come_leaves_the_last_value_and_is_counted() {
+        let mut sensors = Sensors::new(&scenario(&[])).unwrap();
+        let counts = sensors.counts;
+        give(&mut sensors, 0, counts.map(|c| c + 10), 0);
+        assert_eq!((sensors.read(0), sensors.held_jobs()), (None, 0));
+        let before = *sensors.sensed();
+        for job in 1..=3 {
+            for index in (0..READS).filter(|&index| index != COUNTS + 4) {
+                let value = if index == STATUS { 1 } else { (counts[index.min(13) / 2] + 10) as u32 };
+                let value = if (FORCES..STATUS).contains(&index) || index % 2 == 1 && index < FORCES { 0 } else { value };
+                sensors.take(&word(job, index, value, 0));
+            }
+            // only the first miss in a row is news
+            let failed = sensors.read(job);
+            assert_eq!(failed, (job == 1).then_some(COUNTS + 4));
+            assert_eq!(sensors.held_jobs(), job);
+            assert_eq!(sensors.sensed().q[2], before.q[2]);
+        }
+        assert_eq!(sensors.status(), 1);
+        give(&mut sensors, 4, counts, 0);
+        assert_eq!((sensors.read(4), sensors.held_jobs()), (None, 0));
+    }
+
+    #[test]
+    fn under_a_receiver_error_the_force_is_held_but_saturation_is_not_such_an_error() {
+        let mut sensors = Sensors::new(&scenario(&[])).unwrap();
+        let counts = sensors.counts;
+        for (job, errors, force, held) in [(0, 0, 100.0, 0), (1, u32::from(force::ERROR_CRC), 100.0, 1),
+            (2, u32::from(force::ERROR_CRC), 100.0, 2), (3, 0x3F, 300.0, 0)] {
+            give(&mut sensors, job, counts, 0);
+            let newtons = f64::from(job) * 100.0 / 3.0 * 2.0 + 100.0;
+            sensors.take(&word(job, FORCES, (newtons / 400.0 * 16384.0) as u32, 0));
+            sensors.take(&word(job, ERRORS, errors, 0));
+            sensors.read(job);
+            assert!((sensors.sensed().wrench[0] - force).abs() < 0.05, "{job}");
+            assert_eq!(sensors.held_jobs(), held);
+        }
+    }
+
+    #[test]
+    fn the_age_of_a_force_sample_follows_from_its_counter_across_its_wrap() {
+        // filter 4 publishes every 32 ms; its counter wraps after 2097 s
+        let mut sensors = Sensors::new(&scenario(&["force_sensor_if.filter={ cascade = 4 }"])).unwrap();
+        let counts = sensors.counts;
+        for (job, (t, published)) in [(70_000_000, 64_000_000), (2_097_200_000_000, 2_097_184_000_000)].into_iter().enumerate() {
+            give(&mut sensors, job as u32, counts, t);
+            let counter = (published / 32_000_000) as u16;
+            sensors.take(&word(job as u32, COUNTER, counter.into(), t));
+            sensors.read(job as u32);
+            assert_eq!(sensors.force_age(t + 1000), t + 1000 - published);
+            assert_eq!(sensors.encoder_age(t + 1000), 1000);
+        }
+    }
+}

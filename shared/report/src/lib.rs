@@ -1,1 +1,26 @@
-//! report
+//! What a run comes to: measures, verdict, tables, `report.json` and `report.html`.
+//!
+//! A host collects a [`Trace`] and a [`Ledger`] while a variant runs and makes a [`VariantResult`] of
+//! them; [`RunReport`] puts the variants and sweeps together. Rendering is apart from measuring:
+//! [`text`] for the terminal, [`RunReport::write`] for the files. A figure that does not exist (a force
+//! that never rose, a segment never reached) is `None` and shown as `–`, never a made-up number.
+
+mod chart;
+mod html;
+mod ideal;
+mod ledger;
+mod measures;
+mod result;
+mod segments;
+mod series;
+mod svg;
+pub mod text;
+mod trace;
+mod verdict;
+
+pub use ledger::{Ledger, PathLatency};
+pub use measures::RunMeasures;
+pub use result::{RunReport, SCHEMA_VERSION, Sweep, SweepPoint, VariantResult, WriteError};
+pub use segments::SegmentRow;
+pub use trace::{Ended, Trace};
+pub use verdict::{Check, Verdict};

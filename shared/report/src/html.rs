@@ -1,0 +1,213 @@
+//! `report.html`: one file that works offline, with script or without.
+
+use crate::chart::charts;
+use crate::result::RunReport;
+use crate::text::{
+    CHECK_HEADINGS, HEADINGS, LATENCY_HEADINGS, check_row, latency_rows, segments, sweep_table, verdict,
+};
+use crate::trace::Ended;
+use crate::verdict::Verdict;
+use crate::svg;
+
+const TEMPLATE: &str = include_str!("html/template.html");
+const STYLE: &str = include_str!("html/style.css");
+const SCRIPT: &str = include_str!("html/charts.js");
+const UPLOT: &str = include_str!("../vendor/uplot/uPlot.iife.min.js");
+const UPLOT_STYLE: &str = include_str!("../vendor/uplot/uPlot.min.css");
+const UPLOT_LICENCE: &str = include_str!("../vendor/uplot/LICENSE");
+
+/// The whole file; the message says what could not be drawn.
+pub(crate) fn render(report: &RunReport) -> Result<String, String> {
+    let charts = charts(report);
+    let data = serde_json::to_string(&charts).map_err(|error| error.to_string())?;
+    let pictures: Result<Vec<String>, String> = charts.iter().map(svg::draw).collect();
+    let parts = [
+        ("title", escape(&report.title)),
+        ("scenario", escape(&report.scenario)),
+        ("verdict", verdict(report.verdict).to_owned()),
+        ("verdict_class", class(report.verdict).to_owned()),
+        ("facts", facts(report)),
+        ("description", paragraphs(&report.description)),
+        ("cards", cards(report)),
+        ("pictures", pictures?.join("\n")),
+        ("checks", checks(report)),
+        ("segments", segment_tables(report)),
+        ("sweeps", sweeps(report)),
+        ("latencies", latencies(report)),
+        ("style", format!("{UPLOT_STYLE}\n{STYLE}")),
+        ("uplot", format!("/*\n{UPLOT_LICENCE}\n*/\n{UPLOT}")),
+        // "</" must not end the script element
+        ("data", data.replace("</", "<\\/")),
+        ("script", SCRIPT.to_owned()),
+    ];
+    Ok(fill(TEMPLATE, &parts))
+}
+
+/// Replaces `{{name}}`; what is put in is not looked at again.
+fn fill(template: &str, parts: &[(&str, String)]) -> String {
+    let mut out = String::new();
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once("{{") {
+        out += before;
+        let Some((name, behind)) = after.split_once("}}") else { break };
+        if let Some((_, text)) = parts.iter().find(|(known, _)| *known == name) {
+            out += text;
+        }
+        rest = behind;
+    }
+    out + rest
+}
+
+fn facts(report: &RunReport) -> String {
+    let mut facts = vec![
+        format!("scenario <b>{}</b>", escape(&report.scenario)),
+        format!("seed <b>{}</b>", report.seed),
+        format!("<b>{}</b>", escape(&report.pacing)),
+    ];
+    let simulated: f64 = report.variants.iter().map(|variant| variant.simulated_s).sum();
+    facts.push(format!("<b>{simulated:.1} s</b> simulated in {} runs", report.variants.len()));
+    let walls: Option<Vec<f64>> = report.variants.iter().map(|variant| variant.wall_s).collect();
+    if let Some(wall) = walls.map(|walls| walls.iter().sum::<f64>()).filter(|wall| *wall > 0.0) {
+        facts.push(format!("<b>{:.0} ×</b> real time", simulated / wall));
+    }
+    facts.push(format!("vmerack {}", report.vmerack));
+    facts.join("<span class=dot>·</span>")
+}
+
+/// One card per variant: verdict and the figures that matter most.
+fn cards(report: &RunReport) -> String {
+    let mut out = String::new();
+    for (i, variant) in report.variants.iter().enumerate() {
+        let judged = variant.checks.iter().filter(|check| check.passed.is_some());
+        let held = judged.clone().filter(|check| check.passed == Some(true)).count();
+        let means: Vec<String> = variant
+            .segments
+            .iter()
+            .filter(|row| row.force_controlled)
+            .map(|row| row.mean_n.map_or_else(|| "–".into(), |mean| format!("{:.1}", mean + 0.0)))
+            .collect();
+        let ended = match &variant.ended {
+            Ended::Completed => format!("{held} of {} limits hold", judged.count()),
+            Ended::Diverged { at_s } => format!("diverged at {at_s:.2} s"),
+            Ended::Stopped { at_s, .. } => format!("stopped at {at_s:.2} s"),
+        };
+        let findings: String =
+            variant.findings.iter().map(|finding| format!("<p class=finding>{}</p>", escape(finding))).collect();
+        out += &format!(
+            "<article class=card><h3><i class=swatch data-color={i}></i>{}<span class=\"pill {}\">{}</span></h3>\
+             <p class=big>{}<small>N</small></p><p class=note>mean force of each force segment's last second</p>\
+             <p>{ended}</p>{findings}</article>",
+            escape(&variant.name),
+            class(variant.verdict),
+            verdict(variant.verdict),
+            means.join(" <i>/</i> "),
+        );
+    }
+    out
+}
+
+fn checks(report: &RunReport) -> String {
+    let rows: Vec<_> = report
+        .variants
+        .iter()
+        .flat_map(|variant| variant.checks.iter().map(|check| check_row(&variant.name, check)))
+        .collect();
+    if rows.is_empty() {
+        return "<p class=note>The scenario sets no limits.</p>".into();
+    }
+    table(&CHECK_HEADINGS, &rows)
+}
+
+fn segment_tables(report: &RunReport) -> String {
+    let mut out = String::new();
+    if let Some(variant) = report.variants.iter().find(|variant| !variant.ideal.is_empty()) {
+        out += &format!("<h3>ideal impedance, one axis</h3>{}", table(&HEADINGS, &segments(&variant.ideal)));
+    }
+    for variant in &report.variants {
+        out += &format!("<h3>{}</h3>{}", escape(&variant.name), table(&HEADINGS, &segments(&variant.segments)));
+        if let Some(digest) = &variant.digest {
+            out += &format!("<p class=note>digest <code>{}</code></p>", escape(digest));
+        }
+    }
+    out
+}
+
+fn sweeps(report: &RunReport) -> String {
+    let mut out = String::new();
+    for sweep in &report.sweeps {
+        let (headings, rows) = sweep_table(sweep);
+        let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
+        out += &format!(
+            "<h2>Sweep of <code>{}</code></h2><p class=note>mean force of each segment's last second, N</p>{}",
+            escape(&sweep.key),
+            table(&headings, &rows)
+        );
+    }
+    out
+}
+
+fn latencies(report: &RunReport) -> String {
+    let mut out = String::new();
+    let mut shown = None;
+    for variant in &report.variants {
+        if !variant.transfers.is_empty() && shown != Some(&variant.transfers) {
+            let rows = table(&LATENCY_HEADINGS, &latency_rows(&variant.transfers));
+            out += &format!("<h3>modelled, {}</h3>{rows}", escape(&variant.name));
+            shown = Some(&variant.transfers);
+        }
+        if !variant.measured.is_empty() {
+            let rows = table(&LATENCY_HEADINGS, &latency_rows(&variant.measured));
+            out += &format!("<h3>measured, {}</h3>{rows}", escape(&variant.name));
+        }
+    }
+    out
+}
+
+fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
+    let head: String = headings.iter().map(|heading| format!("<th>{}</th>", escape(heading))).collect();
+    let body: String = rows
+        .iter()
+        .map(|row| {
+            let cells: String = row
+                .iter()
+                .map(|cell| {
+                    let class = match cell.as_str() {
+                        "ok" => " class=ok",
+                        "VIOLATED" => " class=bad",
+                        cell if cell == "–" || cell.parse::<f64>().is_ok() => " class=figure",
+                        _ => "",
+                    };
+                    format!("<td{class}>{}</td>", escape(cell))
+                })
+                .collect();
+            format!("<tr>{cells}</tr>")
+        })
+        .collect();
+    format!("<div class=scroll><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>")
+}
+
+fn class(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Passed => "good",
+        Verdict::Failed => "bad",
+    }
+}
+
+fn paragraphs(text: &str) -> String {
+    text.split("\n\n").filter(|part| !part.trim().is_empty()).map(|part| format!("<p>{}</p>", escape(part.trim()))).collect()
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_from_a_scenario_cannot_become_markup() {
+        assert_eq!(escape("<b>&\"</b>"), "&lt;b&gt;&amp;&quot;&lt;/b&gt;");
+        assert_eq!(fill("{{a}}-{{b}}", &[("a", "{{b}}".into()), ("b", "x".into())]), "{{b}}-x");
+    }
+}

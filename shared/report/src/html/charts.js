@@ -1,0 +1,87 @@
+"use strict";
+// Draws CHARTS with uPlot: shared cursor and zoom, limits as shaded areas, dark and light.
+const root = document.documentElement;
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const sync = uPlot.sync("t");
+let plots = [];
+
+const variable = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+const colorOf = (color) => variable(typeof color === "string" ? "--" + color : "--c" + (color.palette % 7));
+
+function shaded(boxes) {
+  return (u) => {
+    const { ctx } = u;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+    ctx.clip();
+    ctx.fillStyle = variable("--limit");
+    for (const box of boxes) {
+      const left = u.valToPos(box.from, "x", true), right = u.valToPos(box.until, "x", true);
+      const top = u.valToPos(box.max, "y", true), bottom = u.valToPos(box.min, "y", true);
+      ctx.fillRect(left, top, right - left, bottom - top);
+    }
+    ctx.restore();
+  };
+}
+
+let zooming = false;
+function zoomAll(u, key) {
+  if (key !== "x" || zooming) return;
+  zooming = true;
+  const { min, max } = u.scales.x;
+  for (const other of plots) if (other !== u) other.setScale("x", { min, max });
+  zooming = false;
+}
+
+function draw() {
+  for (const plot of plots) plot.destroy();
+  plots = [];
+  const host = document.getElementById("charts");
+  host.replaceChildren();
+  const axis = { stroke: variable("--soft"), grid: { stroke: variable("--line"), width: 1 }, ticks: { stroke: variable("--line"), width: 1 } };
+  const format = (value) => (value == null ? "–" : value.toFixed(2));
+  for (const chart of CHARTS) {
+    const box = document.createElement("div");
+    box.className = chart.tall ? "chart tall" : "chart";
+    const heading = document.createElement("h3");
+    heading.append(chart.title + " ");
+    heading.append(Object.assign(document.createElement("small"), { textContent: chart.unit }));
+    box.append(heading);
+    host.append(box);
+    const series = chart.lines.map((line) => ({
+      label: line.label,
+      stroke: colorOf(line.color),
+      width: typeof line.color === "string" ? 1.5 : 2,
+      dash: line.dashed ? [7, 5] : undefined,
+      value: (_, value) => format(value),
+      points: { show: false },
+    }));
+    plots.push(new uPlot({
+      width: box.clientWidth - 20,
+      height: chart.tall ? 380 : 240,
+      cursor: { sync: { key: sync.key }, drag: { x: true, y: false } },
+      scales: { x: { time: false } },
+      axes: [{ ...axis, values: (_, ticks) => ticks.map((t) => t + " s") }, { ...axis, size: 56 }],
+      series: [{ label: "t", value: (_, t) => (t == null ? "–" : t.toFixed(3) + " s") }, ...series],
+      hooks: { drawClear: [shaded(chart.boxes)], setScale: [zoomAll] },
+    }, [chart.t, ...chart.lines.map((line) => line.y)], box));
+  }
+  for (const swatch of document.querySelectorAll(".swatch")) swatch.style.background = variable("--c" + (swatch.dataset.color % 7));
+}
+
+function theme(isDark) {
+  root.classList.toggle("dark", isDark);
+  root.classList.toggle("light", !isDark);
+  draw();
+}
+
+const button = document.getElementById("theme");
+button.hidden = false;
+button.onclick = () => theme(!root.classList.contains("dark"));
+document.getElementById("help").hidden = false;
+dark.addEventListener("change", () => theme(dark.matches));
+addEventListener("resize", () => {
+  for (const plot of plots) plot.setSize({ width: plot.root.parentElement.clientWidth - 20, height: plot.height });
+});
+theme(dark.matches);

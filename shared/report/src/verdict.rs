@@ -1,0 +1,113 @@
+//! Measures against the scenario's limits.
+
+use crate::measures::RunMeasures;
+use crate::segments::SegmentRow;
+use crate::trace::Ended;
+use scenario::{Limit, Measure, Scenario, Variant};
+use serde::Serialize;
+
+/// What a variant, or all of them, came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Every limit holds.
+    Passed,
+    /// A limit is violated, or the run came to a bad end.
+    Failed,
+}
+
+/// One limit applied to a run or to one of its segments.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Check {
+    /// What is measured.
+    pub measure: Measure,
+    /// Segment, where the measure is one of segments.
+    pub segment: Option<String>,
+    /// Value found.
+    pub value: Option<f64>,
+    /// Least that passes.
+    pub min: Option<f64>,
+    /// Greatest that passes.
+    pub max: Option<f64>,
+    /// Whether it passes; `None`: not judged, because the run was asked to end before.
+    pub passed: Option<bool>,
+    /// Where the limit comes from.
+    pub source: String,
+}
+
+/// True of measures that each segment has for itself.
+fn of_segments(measure: Measure) -> bool {
+    use Measure::*;
+    matches!(
+        measure,
+        ForceMeanErrorN
+            | ForceRmsErrorN
+            | ForcePeakN
+            | ForceRiseS
+            | PositionErrorM
+            | IdealPositionDeviationM
+            | IdealTargetDeviationM
+    )
+}
+
+/// True where a segment of this kind has the measure.
+fn applies(measure: Measure, row: &SegmentRow) -> bool {
+    use Measure::*;
+    match measure {
+        ForceMeanErrorN | ForceRmsErrorN | ForcePeakN | ForceRiseS => row.force_controlled,
+        PositionErrorM => !row.force_controlled,
+        _ => true,
+    }
+}
+
+/// All limits of the scenario that apply to the variant.
+pub(crate) fn checks(
+    scenario: &Scenario,
+    variant: &Variant,
+    ended: &Ended,
+    rows: &[SegmentRow],
+    run: &RunMeasures,
+) -> Vec<Check> {
+    let mut checks = Vec::new();
+    for limit in &scenario.limits {
+        if !limit.variants.is_empty() && !limit.variants.contains(&variant.name) {
+            continue;
+        }
+        if !of_segments(limit.measure) {
+            let cut_short = rows.iter().any(|row| !row.reached);
+            checks.push(check(limit, None, run.value(limit.measure, None), cut_short && excused(ended, variant)));
+            continue;
+        }
+        let chosen = |row: &&SegmentRow| match limit.segments.is_empty() {
+            true => applies(limit.measure, row),
+            false => limit.segments.contains(&row.name),
+        };
+        for row in rows.iter().filter(chosen) {
+            let unjudged = !row.reached && excused(ended, variant);
+            checks.push(check(limit, Some(&row.name), run.value(limit.measure, Some(row)), unjudged));
+        }
+    }
+    checks
+}
+
+/// A run that ended early because it was told to, or because that is a result here.
+fn excused(ended: &Ended, variant: &Variant) -> bool {
+    match ended {
+        Ended::Completed => true,
+        Ended::Diverged { .. } => variant.may_diverge,
+        Ended::Stopped { .. } => false,
+    }
+}
+
+fn check(limit: &Limit, segment: Option<&str>, value: Option<f64>, unjudged: bool) -> Check {
+    let holds = |value: f64| limit.min.is_none_or(|min| value >= min) && limit.max.is_none_or(|max| value <= max);
+    Check {
+        measure: limit.measure,
+        segment: segment.map(str::to_owned),
+        value,
+        min: limit.min,
+        max: limit.max,
+        passed: (!unjudged).then(|| value.is_some_and(holds)),
+        source: limit.source.clone(),
+    }
+}

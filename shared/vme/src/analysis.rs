@@ -17,7 +17,7 @@ use crate::Ns;
 use crate::arbiter::{Mode, SLOTS};
 use crate::interrupt::IrqRelease;
 use crate::program::{Access, Direction, Op};
-use crate::rack::Release;
+use crate::rack::{Overrun, Release, Task};
 use crate::requester::ReleasePolicy;
 use crate::timing::Timing;
 use crate::traffic::Arrivals;
@@ -213,6 +213,15 @@ enum Source {
     Traffic(usize),
 }
 
+/// How much later than its turn a task may be released. An interrupter holds one request while another
+/// is served, so releases n periods apart may come as if they were n - 2.
+fn release_jitter(task: &Task) -> Ns {
+    match task.release {
+        Release::Timer | Release::Poll(_) => 0,
+        Release::Interrupt(_) => 2 * task.period_ns,
+    }
+}
+
 /// The plan's demand on the bus from this master.
 fn tenure(timing: &Timing, source: Source, access: &Access) -> Tenure {
     let (rack, wiring) = (timing.rack(), timing.wiring());
@@ -265,7 +274,7 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
         let stream = Some(Stream {
             service_ns,
             period_ns: task.period_ns,
-            jitter_ns: task.period_ns,
+            jitter_ns: task.period_ns + release_jitter(task),
         });
         demands.push(Demand {
             master,
@@ -549,16 +558,20 @@ impl Analysis<'_> {
         let p = wiring.processor_of_task[t];
         let tasks = &wiring.tasks_of_processor[p as usize];
         let at = tasks.iter().position(|&other| other as usize == t)?;
-        let own = self.job(t, programs)?;
+        let mut own = self.job(t, programs)?;
+        let late = rack.tasks[t].overrun == Overrun::Late;
+        if late && matches!(rack.tasks[t].release, Release::Interrupt(_)) {
+            // two releases whose handlers ran late may stand before this one
+            own *= 3;
+        }
         let mut interference = Vec::new();
         for &urgent in &tasks[..at] {
             let spec = &rack.tasks[urgent as usize];
-            let jitter_ns = match spec.release {
-                Release::Timer => 0,
-                Release::Interrupt(_) => spec.period_ns,
+            if matches!(spec.release, Release::Poll(_)) {
                 // it never leaves the processor
-                Release::Poll(_) => return None,
-            };
+                return None;
+            }
+            let jitter_ns = release_jitter(spec);
             let service_ns = self.job(urgent as usize, programs)?;
             interference.push(Stream {
                 service_ns,

@@ -235,7 +235,8 @@ fn no_time_exceeds_its_bound(seed: u64) -> (usize, usize) {
 #[test]
 fn no_observed_time_exceeds_its_bound_in_random_racks() {
     let (mut compared, mut free) = (0, 0);
-    for seed in 0..250 {
+    // two of the seeds once broke bounds that forgot late traffic, and handlers that run late
+    for seed in (0..250).chain([1_003_575, 1_009_720]) {
         let (c, f) = no_time_exceeds_its_bound(seed);
         compared += c;
         free += f;

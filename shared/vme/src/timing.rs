@@ -120,6 +120,8 @@ pub struct Timing {
     fault_times: Arc<[(Ns, u16, bool)]>,
     next_fault: usize,
     now: Ns,
+    /// Where the call of [`Timing::advance`] under way ends.
+    limit: Ns,
     /// When each of [`Wiring::sources`] has its next event.
     agenda: agenda::Agenda,
     arbiter: Arbiter,
@@ -224,6 +226,7 @@ impl Timing {
             generators,
             counters: Counters::default(),
             now: 0,
+            limit: 0,
             agenda,
             faults: Arc::new(faults),
             fault_times: fault_times.into(),
@@ -273,6 +276,7 @@ impl Timing {
     /// Runs to the next stop, or to `limit` if that comes first (events at `limit` are left for
     /// later). Gives the sink every transfer whose data moved on the way, in the order of `data_at`.
     pub fn advance(&mut self, limit: Ns, sink: &mut impl Sink) -> Stop {
+        self.limit = limit;
         loop {
             let (at, next) = self.agenda.next();
             if at >= limit {
@@ -333,6 +337,7 @@ impl Clone for Timing {
         self.fault_times.clone_from(&from.fault_times);
         self.next_fault = from.next_fault;
         self.now = from.now;
+        self.limit = from.limit;
         self.agenda.clone_from(&from.agenda);
         self.arbiter.clone_from(&from.arbiter);
         self.bus = from.bus;

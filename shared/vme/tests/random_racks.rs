@@ -334,6 +334,28 @@ fn every_request_ends_once_the_bus_has_one_owner_and_time_goes_forward() {
     }
 }
 
+#[test]
+fn many_short_windows_give_the_same_transfers_and_jobs_as_one_long_one() {
+    for seed in 0..150 {
+        let mut draw = Draw::new(20_000_000 + seed);
+        let (rack, programs) = random_rack(&mut draw);
+        let mut whole = Timing::new(rack).unwrap();
+        let mut parts = whole.clone();
+        let expected = run(&mut whole, &programs, 1_500_000);
+        for (t, program) in programs.iter().enumerate() {
+            parts.set_program(t as u16, program);
+        }
+        let mut log = Log::default();
+        let mut limit = 0;
+        while limit < 1_500_000 {
+            limit = (limit + draw.from(1, 700)).min(1_500_000);
+            while parts.advance(limit, &mut log) != Stop::Limit {}
+        }
+        assert_eq!(log.transfers, expected.transfers, "seed {seed}");
+        assert_eq!(log.jobs, expected.jobs, "seed {seed}");
+    }
+}
+
 /// A random set of sporadic masters under PRI with unlike tenures; most urgent first.
 fn random_set(draw: &mut Draw) -> Rack {
     let n = draw.from(2, 9) as usize;

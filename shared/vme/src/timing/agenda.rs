@@ -58,8 +58,12 @@ impl Agenda {
             self.known = true;
         }
         let mut next = self.quiet;
-        for source in self.busy.iter().cloned().flatten() {
-            next = next.min((self.due[source], source));
+        for busy in &self.busy {
+            for (source, &at) in (busy.start..).zip(&self.due[busy.clone()]) {
+                if (at, source) < next {
+                    next = (at, source);
+                }
+            }
         }
         next
     }

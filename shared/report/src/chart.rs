@@ -49,14 +49,14 @@ pub(crate) enum Paint {
     Palette(usize),
 }
 
-/// Where a limit applies: from, until (s), least, greatest.
+/// Where a limit applies: from, until (s), least, greatest; `allowed` says on which side of it one is inside.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Span {
+    pub allowed: bool,
     pub from: f64,
     pub until: f64,
     pub min: f64,
     pub max: f64,
-    pub label: String,
 }
 
 /// All pictures of a report.
@@ -99,8 +99,7 @@ pub(crate) fn charts(report: &RunReport) -> Vec<Chart> {
     let chart = |title: String, unit, lines, boxes, tall| Chart { title, unit, t: grid.clone(), lines, boxes, tall };
 
     let mut force = vec![Line { label: "F_d".into(), color: Paint::Command, dashed: true, y: commanded(report, &grid) }];
-    force.extend(ideals().map(|(label, ideal)| reference(label, &ideal.force, 1.0)));
-    let mut position: Vec<_> = ideals().map(|(label, ideal)| reference(label, &ideal.position, 1e3)).collect();
+    let mut position = Vec::new();
     let mut error = Vec::new();
     for (i, variant) in report.variants.iter().enumerate() {
         force.push(line(&variant.name, i, &variant.curves.force, 1.0));
@@ -113,6 +112,9 @@ pub(crate) fn charts(report: &RunReport) -> Vec<Chart> {
         };
         error.push(line(&variant.name, i, &difference, 1e3));
     }
+    // dashed, and last: it must be seen on top of a run that follows it
+    force.extend(ideals().map(|(label, ideal)| reference(label, &ideal.force, 1.0)));
+    position.extend(ideals().map(|(label, ideal)| reference(label, &ideal.position, 1e3)));
     let mut charts = vec![
         chart(format!("Contact force along {axis}"), "N", force, limits(report), true),
         chart(format!("Tool position along {axis}"), "mm", position, Vec::new(), false),
@@ -122,8 +124,8 @@ pub(crate) fn charts(report: &RunReport) -> Vec<Chart> {
         let lines = (0..JOINTS)
             .map(|i| line(&format!("joint {}", i + 1), i, &variant.curves.torque[i], 1.0))
             .collect();
-        let limit = |min, max| Span { from: 0.0, until: end, min, max, label: "torque limit".into() };
-        let boxes = vec![limit(100.0, 110.0), limit(-110.0, -100.0)];
+        let limit = |min, max| Span { allowed: false, from: 0.0, until: end, min, max };
+        let boxes = vec![limit(100.0, 1000.0), limit(-1000.0, -100.0)];
         charts.push(chart(format!("Joint torques: {}", variant.name), "% of limit", lines, boxes, false));
     }
     charts
@@ -166,18 +168,18 @@ fn limits(report: &RunReport) -> Vec<Span> {
                 (Measure::ForceMeanErrorN, Some(row), _, Some(max)) => {
                     let wanted = row.commanded_n.unwrap_or(0.0);
                     Span {
+                        allowed: true,
                         from: (row.end_s - 1.0).max(row.start_s),
                         until: row.end_s,
                         min: wanted - max,
                         max: wanted + max,
-                        label: format!("mean of the last second ± {max} N"),
                     }
                 }
                 (Measure::FirstPeakN, _, Some(min), Some(max)) => {
                     let from = variant.run.first_contact_s.unwrap_or(0.0);
                     let row = variant.segments.iter().find(|row| row.start_s <= from && from < row.end_s);
                     let from = row.map_or(0.0, |row| row.start_s);
-                    Span { from, until: from + 1.0, min, max, label: "first peak".into() }
+                    Span { allowed: true, from, until: from + 1.0, min, max }
                 }
                 _ => continue,
             };

@@ -43,7 +43,12 @@ fn plot(
     plot.configure_mesh().light_line_style(WHITE).x_desc("t (s)").draw()?;
     for span in &chart.boxes {
         let corners = [(span.from, span.min.max(low - margin)), (span.until, span.max.min(high + margin))];
-        plot.draw_series([Rectangle::new(corners, PALETTE[2].mix(0.18).filled())])?;
+        // out of the picture
+        if corners[0].1 >= corners[1].1 {
+            continue;
+        }
+        let color = if span.allowed { PALETTE[2] } else { PALETTE[4] };
+        plot.draw_series([Rectangle::new(corners, color.mix(0.15).filled())])?;
     }
     let stride = chart.t.len().div_ceil(POINTS).max(1);
     for line in &chart.lines {

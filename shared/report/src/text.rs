@@ -12,8 +12,8 @@ pub fn render(report: &RunReport) -> String {
     let mut shown: Option<&[SegmentRow]> = None;
     for variant in &report.variants {
         if !variant.ideal.is_empty() && shown.is_none_or(|rows| rows != variant.ideal) {
-            let of = if report.variants.iter().all(|other| other.ideal == variant.ideal) { "" } else { &variant.name };
-            out += &format!("\nideal impedance, one axis {of}\n{}", table(&HEADINGS, &segments(&variant.ideal)));
+            let of = if report.variants.iter().all(|other| other.ideal == variant.ideal) { String::new() } else { format!(", {}", variant.name) };
+            out += &format!("\nideal impedance, one axis{of}\n{}", table(&HEADINGS, &segments(&variant.ideal)));
             shown = Some(&variant.ideal);
         }
         out += &format!("\n{}\n{}", variant.name, table(&HEADINGS, &segments(&variant.segments)));
@@ -166,8 +166,8 @@ fn number(value: Option<f64>, digits: usize) -> String {
 fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
     let figures: Vec<bool> = (0..headings.len())
         .map(|i| {
-            let mut cells = rows.iter().filter_map(|row| row.get(i)).filter(|cell| *cell != "–").peekable();
-            cells.peek().is_some() && cells.all(|cell| cell.parse::<f64>().is_ok())
+            let mut cells = rows.iter().filter_map(|row| row.get(i)).filter(|cell| *cell != "–");
+            cells.all(|cell| cell.parse::<f64>().is_ok())
         })
         .collect();
     let width = |i: usize| {

@@ -15,8 +15,8 @@ function shaded(boxes) {
     ctx.beginPath();
     ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
     ctx.clip();
-    ctx.fillStyle = variable("--limit");
     for (const box of boxes) {
+      ctx.fillStyle = variable(box.allowed ? "--limit" : "--beyond");
       const left = u.valToPos(box.from, "x", true), right = u.valToPos(box.until, "x", true);
       const top = u.valToPos(box.max, "y", true), bottom = u.valToPos(box.min, "y", true);
       ctx.fillRect(left, top, right - left, bottom - top);

@@ -23,7 +23,18 @@ pub const SCENARIO_ATTACHMENT: &str = "scenario.toml";
 /// Name of the metadata record.
 pub const METADATA: &str = "vmerack";
 
-const LATCHED_QOS: &str = "- history: keep_last\n  depth: 1\n  reliability: reliable\n  durability: transient_local\n";
+/// Quality of service of a latched topic, as ROS 2 bags of every version write it: keep last 1, reliable, transient local.
+const LATCHED_QOS: &str = "\
+- history: 1
+  depth: 1
+  reliability: 1
+  durability: 1
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: 1
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+";
 
 /// Why and when a record ended before its run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -107,7 +107,8 @@ pub struct Plant {
     pub joints: Joints,
     /// Factor on every friction figure of the drives (0 = none).
     pub friction_scale: f64,
-    /// Kinematic error of the gears on or off.
+    /// Kinematic error of the gears. Off by default: seen from the motor it varies the gear ratio by a tenth, which alone
+    /// keeps the original scheme from regulating, with or without friction.
     pub kinematic_error: bool,
     /// Gravity in the base frame.
     pub gravity_m_per_s2: [f64; 3],
@@ -125,7 +126,7 @@ impl Default for Plant {
             integrator: Integrator::SemiImplicit,
             joints: Joints::Flexible,
             friction_scale: 1.0,
-            kinematic_error: true,
+            kinematic_error: false,
             gravity_m_per_s2: [0.0, 0.0, -9.81],
             runaway_rad_per_s: 20.0,
             mismatch: None,

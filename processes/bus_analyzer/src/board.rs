@@ -34,7 +34,11 @@ pub struct BusAnalyzer {
 impl BusAnalyzer {
     /// A recorder that writes to `path`, where given. `resolved_toml` is attached to the record. The
     /// error says which file and why.
-    pub fn new(scenario: &Scenario, path: Option<&Path>, resolved_toml: &str) -> Result<BusAnalyzer, String> {
+    pub fn new(
+        scenario: &Scenario,
+        path: Option<&Path>,
+        resolved_toml: &str,
+    ) -> Result<BusAnalyzer, String> {
         let description = robot::describe(scenario)?;
         let frame = scenario.task_frame();
         let record = match path {
@@ -82,14 +86,26 @@ impl BusAnalyzer {
         self.emit(Topic::RobotDescription, 0);
         self.cdr.begin();
         let task = (&self.task_position, &self.task_orientation);
-        encode::transforms(&mut self.cdr, 0, &self.base_link, &[(encode::TASK_FRAME, task)]);
+        encode::transforms(
+            &mut self.cdr,
+            0,
+            &self.base_link,
+            &[(encode::TASK_FRAME, task)],
+        );
         self.emit(Topic::TfStatic, 0);
     }
 
     fn plant(&mut self, probe: &PlantProbe) {
         let t = probe.t;
         self.cdr.begin();
-        encode::joint_state(&mut self.cdr, t, &self.joints, &probe.q, &probe.qd, &probe.spring_torque);
+        encode::joint_state(
+            &mut self.cdr,
+            t,
+            &self.joints,
+            &probe.q,
+            &probe.qd,
+            &probe.spring_torque,
+        );
         self.emit(Topic::PlantJointStates, t);
         self.cdr.begin();
         encode::wrench_stamped(&mut self.cdr, t, &probe.contact);
@@ -108,12 +124,23 @@ impl BusAnalyzer {
         let target = (&probe.xt, &probe.xt_orientation);
         let desired = (&probe.xd, &probe.xd_orientation);
         self.cdr.begin();
-        encode::joint_state(&mut self.cdr, t, &self.joints, &probe.q, &probe.qd, &probe.torque);
+        encode::joint_state(
+            &mut self.cdr,
+            t,
+            &self.joints,
+            &probe.q,
+            &probe.qd,
+            &probe.torque,
+        );
         self.emit(Topic::JointStates, t);
         self.cdr.begin();
         encode::wrench_stamped(&mut self.cdr, t, &probe.fe);
         self.emit(Topic::Wrench, t);
-        for (topic, pose) in [(Topic::Tool, tool), (Topic::Target, target), (Topic::Desired, desired)] {
+        for (topic, pose) in [
+            (Topic::Tool, tool),
+            (Topic::Target, target),
+            (Topic::Desired, desired),
+        ] {
             self.cdr.begin();
             encode::pose_stamped(&mut self.cdr, t, pose);
             self.emit(topic, t);
@@ -132,7 +159,15 @@ impl BusAnalyzer {
         let mut sorted = std::mem::take(&mut self.events);
         sorted.clear();
         sorted.extend_from_slice(events);
-        sorted.sort_unstable_by_key(|event| (event.t, event.kind, event.severity, event.a.to_bits(), event.b.to_bits()));
+        sorted.sort_unstable_by_key(|event| {
+            (
+                event.t,
+                event.kind,
+                event.severity,
+                event.a.to_bits(),
+                event.b.to_bits(),
+            )
+        });
         for event in &sorted {
             self.cdr.begin();
             encode::event(&mut self.cdr, event);
@@ -157,7 +192,10 @@ impl BusAnalyzer {
 
     fn give_up(&mut self, at: Ns, error: &mcap::McapError) {
         self.record = None;
-        self.lost = Some(Lost { at, reason: reason(error) });
+        self.lost = Some(Lost {
+            at,
+            reason: reason(error),
+        });
     }
 }
 
@@ -191,14 +229,30 @@ impl Board for BusAnalyzer {
             self.give_up(inputs.until, &error);
         }
         if recorded && let Some(lost) = &self.lost {
-            out.mail.events.push(Event::new(lost.at, EventKind::MessageLost, Severity::Error, 0.0, 0.0));
+            out.mail.events.push(Event::new(
+                lost.at,
+                EventKind::MessageLost,
+                Severity::Error,
+                0.0,
+                0.0,
+            ));
         }
     }
 }
 
 fn metadata(scenario: &Scenario) -> BTreeMap<String, String> {
-    let cards: Vec<_> = scenario.rack.slaves.iter().map(|slave| slave.name.as_str()).collect();
-    let tasks: Vec<_> = scenario.rack.tasks.iter().map(|task| task.name.as_str()).collect();
+    let cards: Vec<_> = scenario
+        .rack
+        .slaves
+        .iter()
+        .map(|slave| slave.name.as_str())
+        .collect();
+    let tasks: Vec<_> = scenario
+        .rack
+        .tasks
+        .iter()
+        .map(|task| task.name.as_str())
+        .collect();
     BTreeMap::from([
         ("title".into(), scenario.title.clone()),
         ("seed".into(), scenario.seed.to_string()),

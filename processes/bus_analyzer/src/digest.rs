@@ -42,18 +42,30 @@ impl Digest {
         self.disordered |= t < self.hashed_until;
         let start = self.bytes.len();
         self.bytes.extend_from_slice(cdr);
-        self.pending.push(Message { t, topic, sequence, start, end: self.bytes.len() });
+        self.pending.push(Message {
+            t,
+            topic,
+            sequence,
+            start,
+            end: self.bytes.len(),
+        });
     }
 
     /// No message before `t` will come any more.
     pub fn advance(&mut self, t: Ns) {
-        self.pending.sort_unstable_by_key(|message| (message.t, message.topic, message.sequence));
+        self.pending
+            .sort_unstable_by_key(|message| (message.t, message.topic, message.sequence));
         let ready = self.pending.partition_point(|message| message.t < t);
         for message in self.pending.drain(..ready) {
             hash_message(&mut self.hash, &message, &self.bytes);
         }
         // the rest moves to the front of the same memory
-        let first = self.pending.iter().map(|message| message.start).min().unwrap_or(self.bytes.len());
+        let first = self
+            .pending
+            .iter()
+            .map(|message| message.start)
+            .min()
+            .unwrap_or(self.bytes.len());
         self.bytes.drain(..first);
         for message in &mut self.pending {
             message.start -= first;
@@ -73,7 +85,14 @@ impl Digest {
 
 fn hash_message(hash: &mut Sha256, message: &Message, bytes: &[u8]) {
     let cdr = &bytes[message.start..message.end];
-    add(hash, message.topic.name(), message.topic.type_name(), message.t, message.sequence, cdr);
+    add(
+        hash,
+        message.topic.name(),
+        message.topic.type_name(),
+        message.t,
+        message.sequence,
+        cdr,
+    );
 }
 
 fn add(hash: &mut Sha256, channel: &str, schema: &str, t: Ns, sequence: u32, cdr: &[u8]) {
@@ -88,7 +107,10 @@ fn add(hash: &mut Sha256, channel: &str, schema: &str, t: Ns, sequence: u32, cdr
 }
 
 fn hexadecimal(hash: Sha256) -> String {
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    hash.finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
 }
 
 /// Why a file has no digest.
@@ -114,8 +136,14 @@ pub enum DigestError {
 
 /// Digest of a record, in hexadecimal. All its messages are held in memory.
 pub fn digest_file(path: &Path) -> Result<String, DigestError> {
-    let file = fs::read(path).map_err(|source| DigestError::Read { path: path.to_owned(), source })?;
-    digest_bytes(&file).map_err(|source| DigestError::Damaged { path: path.to_owned(), source })
+    let file = fs::read(path).map_err(|source| DigestError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    digest_bytes(&file).map_err(|source| DigestError::Damaged {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 fn digest_bytes(file: &[u8]) -> mcap::McapResult<String> {
@@ -125,13 +153,22 @@ fn digest_bytes(file: &[u8]) -> mcap::McapResult<String> {
     for (position, message) in stream.enumerate() {
         let message = message?;
         if !message.channel.topic.starts_with(WALL) {
-            let key = (message.publish_time, message.channel.topic.clone(), message.sequence, position);
+            let key = (
+                message.publish_time,
+                message.channel.topic.clone(),
+                message.sequence,
+                position,
+            );
             messages.insert(key, message);
         }
     }
     let mut hash = Sha256::new();
     for ((t, topic, sequence, _), message) in &messages {
-        let schema = message.channel.schema.as_ref().map_or("", |schema| schema.name.as_str());
+        let schema = message
+            .channel
+            .schema
+            .as_ref()
+            .map_or("", |schema| schema.name.as_str());
         add(&mut hash, topic, schema, *t, *sequence, &message.data);
     }
     Ok(hexadecimal(hash))

@@ -116,7 +116,12 @@ pub fn transfers(cdr: &mut Cdr, from: Ns, until: Ns, transfers: &[TransferRecord
     cdr.u64(until);
     cdr.u32(transfers.len() as u32);
     for transfer in transfers {
-        for time in [transfer.requested, transfer.granted, transfer.data_at, transfer.done] {
+        for time in [
+            transfer.requested,
+            transfer.granted,
+            transfer.data_at,
+            transfer.done,
+        ] {
             cdr.u64(time);
         }
         for number in [transfer.addr, transfer.n, transfer.job] {
@@ -134,7 +139,10 @@ pub fn transfers(cdr: &mut Cdr, from: Ns, until: Ns, transfers: &[TransferRecord
 /// `diagnostic_msgs/DiagnosticArray` with one status.
 pub fn event(cdr: &mut Cdr, event: &Event) {
     let kind = EventKind::from_number(event.kind);
-    let name = kind.map_or_else(|| format!("event-{}", event.kind), |kind| kind.name().to_owned());
+    let name = kind.map_or_else(
+        || format!("event-{}", event.kind),
+        |kind| kind.name().to_owned(),
+    );
     let [a, b] = kind.map_or(["a", "b"], figures);
     let values = [(a, event.a), (b, event.b)];
     let values = || values.iter().filter(|(key, _)| !key.is_empty());
@@ -143,7 +151,12 @@ pub fn event(cdr: &mut Cdr, event: &Event) {
     cdr.u32(1);
     cdr.u8(event.severity as u8);
     cdr.string(&name);
-    cdr.string(&values().map(|(key, value)| format!("{key} {value}")).collect::<Vec<_>>().join(", "));
+    cdr.string(
+        &values()
+            .map(|(key, value)| format!("{key} {value}"))
+            .collect::<Vec<_>>()
+            .join(", "),
+    );
     cdr.string("");
     cdr.u32(values().count() as u32);
     for (key, value) in values() {

@@ -20,5 +20,5 @@ pub mod topics;
 pub use board::BusAnalyzer;
 pub use digest::{DigestError, digest_file};
 pub use record::Lost;
-pub use recover::{Recovered, RecoverError, recover};
+pub use recover::{RecoverError, Recovered, recover};
 pub use topics::Topic;

@@ -6,6 +6,10 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     pacing::serve(&|_, context| {
         let resolved = context.resolved().map_err(|error| error.to_string())?;
-        Ok(Box::new(BusAnalyzer::new(&context.scenario, context.record.as_deref(), &resolved)?))
+        Ok(Box::new(BusAnalyzer::new(
+            &context.scenario,
+            context.record.as_deref(),
+            &resolved,
+        )?))
     })
 }

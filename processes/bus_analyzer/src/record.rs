@@ -64,12 +64,19 @@ pub(crate) fn options() -> WriteOptions {
 
 /// A file for [`options`]; nothing is written yet.
 pub(crate) fn sink(path: &Path) -> std::io::Result<NoSeek<BufWriter<File>>> {
-    Ok(NoSeek::new(BufWriter::with_capacity(64 * 1024, File::create(path)?)))
+    Ok(NoSeek::new(BufWriter::with_capacity(
+        64 * 1024,
+        File::create(path)?,
+    )))
 }
 
 impl Record {
     /// Creates the file with the scenario attached and all channels announced.
-    pub fn create(path: &Path, resolved_toml: &str, metadata: BTreeMap<String, String>) -> mcap::McapResult<Record> {
+    pub fn create(
+        path: &Path,
+        resolved_toml: &str,
+        metadata: BTreeMap<String, String>,
+    ) -> mcap::McapResult<Record> {
         let mut writer = options().create(sink(path)?)?;
         writer.attach(&Attachment {
             log_time: 0,
@@ -78,7 +85,10 @@ impl Record {
             media_type: "application/toml".into(),
             data: Cow::Borrowed(resolved_toml.as_bytes()),
         })?;
-        writer.write_metadata(&Metadata { name: METADATA.into(), metadata })?;
+        writer.write_metadata(&Metadata {
+            name: METADATA.into(),
+            metadata,
+        })?;
         let mut channels = [0; TOPICS.len()];
         for topic in TOPICS {
             // a test holds that every topic has a schema
@@ -86,7 +96,8 @@ impl Record {
             let schema = writer.add_schema(topic.type_name(), "ros2msg", definition.as_bytes())?;
             let qos = if topic.is_latched() { LATCHED_QOS } else { "" };
             let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), qos.to_owned())]);
-            channels[topic as usize] = writer.add_channel(schema, topic.name(), "cdr", &metadata)?;
+            channels[topic as usize] =
+                writer.add_channel(schema, topic.name(), "cdr", &metadata)?;
         }
         writer.flush()?;
         Ok(Record { writer, channels })
@@ -94,9 +105,23 @@ impl Record {
 
     /// Appends a message. Simulated time is both its producer's and the recorder's: the file of a run
     /// is the same every time.
-    pub fn write(&mut self, topic: Topic, t: Ns, sequence: u32, cdr: &[u8]) -> mcap::McapResult<()> {
+    pub fn write(
+        &mut self,
+        topic: Topic,
+        t: Ns,
+        sequence: u32,
+        cdr: &[u8],
+    ) -> mcap::McapResult<()> {
         let channel_id = self.channels[topic as usize];
-        self.writer.write_to_known_channel(&MessageHeader { channel_id, sequence, log_time: t, publish_time: t }, cdr)
+        self.writer.write_to_known_channel(
+            &MessageHeader {
+                channel_id,
+                sequence,
+                log_time: t,
+                publish_time: t,
+            },
+            cdr,
+        )
     }
 
     /// Writes the last chunk and the summary.

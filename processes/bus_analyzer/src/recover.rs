@@ -82,7 +82,12 @@ impl Recovered {
 impl fmt::Display for Recovered {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let seconds = |ns: Ns| ns as f64 * 1e-9;
-        write!(f, "{} messages recovered, up to {:.3} s", self.messages, seconds(self.last))?;
+        write!(
+            f,
+            "{} messages recovered, up to {:.3} s",
+            self.messages,
+            seconds(self.last)
+        )?;
         if let Some(duration) = self.duration {
             write!(f, " of {:.3} s", seconds(duration))?;
         }
@@ -90,7 +95,11 @@ impl fmt::Display for Recovered {
             return write!(f, "; nothing is missing");
         }
         if !self.was_complete {
-            write!(f, "\nmissing: what was recorded after {:.3} s", seconds(self.last))?;
+            write!(
+                f,
+                "\nmissing: what was recorded after {:.3} s",
+                seconds(self.last)
+            )?;
             write!(f, " ({} bytes of an unfinished chunk)", self.bytes_lost)?;
         }
         if self.damaged_chunks > 0 {
@@ -105,15 +114,23 @@ impl fmt::Display for Recovered {
 
 /// Writes all that can be read of `input` to `output`.
 pub fn recover(input: &Path, output: &Path) -> Result<Recovered, RecoverError> {
-    let unreadable = |source| RecoverError::Read { path: input.to_owned(), source };
+    let unreadable = |source| RecoverError::Read {
+        path: input.to_owned(),
+        source,
+    };
     let mut file = File::open(input).map_err(unreadable)?;
     if let (Ok(from), Ok(to)) = (input.canonicalize(), output.canonicalize())
         && from == to
     {
-        return Err(RecoverError::SameFile { path: output.to_owned() });
+        return Err(RecoverError::SameFile {
+            path: output.to_owned(),
+        });
     }
     let size = file.metadata().map_err(unreadable)?.len();
-    let unwritable = |source| RecoverError::Write { path: output.to_owned(), source };
+    let unwritable = |source| RecoverError::Write {
+        path: output.to_owned(),
+        source,
+    };
 
     let mut reader = LinearReader::new_with_options(
         LinearReaderOptions::default()
@@ -128,7 +145,10 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovered, RecoverError> {
             None => break,
             Some(Ok(event)) => event,
             Some(Err(source)) if copy.is_none() => {
-                return Err(RecoverError::NoRecord { path: input.to_owned(), source });
+                return Err(RecoverError::NoRecord {
+                    path: input.to_owned(),
+                    source,
+                });
             }
             Some(Err(_)) => break,
         };
@@ -139,7 +159,9 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovered, RecoverError> {
             }
             LinearReadEvent::Record { data, opcode } => {
                 let length = data.len() as u64 + 9;
-                let Ok(record) = parse_record(opcode, data) else { break };
+                let Ok(record) = parse_record(opcode, data) else {
+                    break;
+                };
                 good += length;
                 match (record, &mut copy) {
                     (Record::Header(_), None) => {
@@ -157,7 +179,10 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovered, RecoverError> {
         }
     }
     let Some(mut copy) = copy else {
-        return Err(RecoverError::NoRecord { path: input.to_owned(), source: McapError::UnexpectedEof });
+        return Err(RecoverError::NoRecord {
+            path: input.to_owned(),
+            source: McapError::UnexpectedEof,
+        });
     };
     if !copy.recovered.was_complete {
         copy.recovered.bytes_lost = size.saturating_sub(good);
@@ -176,27 +201,49 @@ struct Copy {
 impl Copy {
     fn new(output: &Path) -> mcap::McapResult<Copy> {
         let writer = record::options().create(record::sink(output)?)?;
-        Ok(Copy { writer, recovered: Recovered::default(), topics: BTreeMap::new(), next_sequence: BTreeMap::new() })
+        Ok(Copy {
+            writer,
+            recovered: Recovered::default(),
+            topics: BTreeMap::new(),
+            next_sequence: BTreeMap::new(),
+        })
     }
 
     fn take(&mut self, record: Record) -> mcap::McapResult<()> {
         match record {
             Record::Schema { header, data } => {
-                self.writer.add_schema_with_id(header.id, &header.name, &header.encoding, &data)?;
+                self.writer
+                    .add_schema_with_id(header.id, &header.name, &header.encoding, &data)?;
             }
             Record::Channel(channel) => {
-                let mcap::records::Channel { id, schema_id, topic, message_encoding, metadata } = channel;
-                self.writer.add_channel_with_id(id, schema_id, &topic, &message_encoding, &metadata)?;
+                let mcap::records::Channel {
+                    id,
+                    schema_id,
+                    topic,
+                    message_encoding,
+                    metadata,
+                } = channel;
+                self.writer.add_channel_with_id(
+                    id,
+                    schema_id,
+                    &topic,
+                    &message_encoding,
+                    &metadata,
+                )?;
                 self.topics.insert(id, topic);
             }
             Record::Message { header, data } if self.topics.contains_key(&header.channel_id) => {
                 self.writer.write_to_known_channel(&header, &data)?;
                 self.recovered.messages += 1;
                 self.recovered.last = self.recovered.last.max(header.publish_time);
-                let expected = self.next_sequence.insert(header.channel_id, header.sequence.wrapping_add(1)).unwrap_or(0);
+                let expected = self
+                    .next_sequence
+                    .insert(header.channel_id, header.sequence.wrapping_add(1))
+                    .unwrap_or(0);
                 if header.sequence > expected {
                     let topic = self.topics[&header.channel_id].clone();
-                    *self.recovered.gaps.entry(topic).or_default() += u64::from(header.sequence - expected);
+                    *self.recovered.gaps.entry(topic).or_default() +=
+                        u64::from(header.sequence - expected);
                 }
             }
             Record::Chunk { header, data } => {
@@ -220,7 +267,10 @@ impl Copy {
             })?,
             Record::Metadata(metadata) => {
                 if metadata.name == METADATA {
-                    self.recovered.duration = metadata.metadata.get("duration_ns").and_then(|ns| ns.parse().ok());
+                    self.recovered.duration = metadata
+                        .metadata
+                        .get("duration_ns")
+                        .and_then(|ns| ns.parse().ok());
                 }
                 self.writer.write_metadata(&metadata)?;
             }
@@ -236,4 +286,3 @@ impl Copy {
         Ok(self.recovered)
     }
 }
-

@@ -10,24 +10,39 @@ use std::path::Path;
 const PERIOD: u64 = 5_000_000;
 
 fn scenario() -> Scenario {
-    scenario::load("table-5-3", &[]).unwrap().scenario().unwrap()
+    scenario::load("table-5-3", &[])
+        .unwrap()
+        .scenario()
+        .unwrap()
 }
 
 /// Window `k` of a run in which every number differs from every other.
 fn window(k: u64) -> Inputs {
-    let mut inputs = Inputs { from: k.saturating_sub(1) * PERIOD, until: k * PERIOD, boot: k == 0, ..Inputs::default() };
+    let mut inputs = Inputs {
+        from: k.saturating_sub(1) * PERIOD,
+        until: k * PERIOD,
+        boot: k == 0,
+        ..Inputs::default()
+    };
     let t = inputs.until;
     let mut x = k as f64;
     let mut next = || {
         x += 0.1;
         x.sqrt()
     };
-    let mut plant = PlantProbe { t, ..PlantProbe::zeroed() };
+    let mut plant = PlantProbe {
+        t,
+        ..PlantProbe::zeroed()
+    };
     plant.q = std::array::from_fn(|_| next());
     plant.contact = std::array::from_fn(|_| next());
     inputs.mail.plant_probe.push(plant);
     if k > 0 {
-        let mut control = ControlProbe { t, job: k as u32, ..ControlProbe::zeroed() };
+        let mut control = ControlProbe {
+            t,
+            job: k as u32,
+            ..ControlProbe::zeroed()
+        };
         control.q = std::array::from_fn(|_| next());
         control.torque = std::array::from_fn(|_| next());
         control.fe = std::array::from_fn(|_| next());
@@ -50,13 +65,29 @@ fn window(k: u64) -> Inputs {
             };
             inputs.mail.transfers.push(transfer);
         }
-        inputs.mail.events.push(Event::new(t, EventKind::SegmentStart, Severity::Ok, k as f64, 0.0));
-        inputs.mail.events.push(Event::new(inputs.from, EventKind::TorqueLimit, Severity::Warn, 1.0, 3.0));
+        inputs.mail.events.push(Event::new(
+            t,
+            EventKind::SegmentStart,
+            Severity::Ok,
+            k as f64,
+            0.0,
+        ));
+        inputs.mail.events.push(Event::new(
+            inputs.from,
+            EventKind::TorqueLimit,
+            Severity::Warn,
+            1.0,
+            3.0,
+        ));
     }
     inputs
 }
 
-fn run(mut analyzer: BusAnalyzer, windows: u64, mut change: impl FnMut(u64, &mut Inputs)) -> BusAnalyzer {
+fn run(
+    mut analyzer: BusAnalyzer,
+    windows: u64,
+    mut change: impl FnMut(u64, &mut Inputs),
+) -> BusAnalyzer {
     let mut out = Outputs::default();
     for k in 0..windows {
         let mut inputs = window(k);
@@ -68,14 +99,24 @@ fn run(mut analyzer: BusAnalyzer, windows: u64, mut change: impl FnMut(u64, &mut
 }
 
 fn record(path: &Path, windows: u64, change: impl FnMut(u64, &mut Inputs)) -> String {
-    let analyzer = BusAnalyzer::new(&scenario(), Some(path), "title = \"x\"").unwrap().with_digest();
+    let analyzer = BusAnalyzer::new(&scenario(), Some(path), "title = \"x\"")
+        .unwrap()
+        .with_digest();
     let analyzer = run(analyzer, windows, change);
     assert_eq!(analyzer.lost(), None);
     analyzer.digest().unwrap()
 }
 
 fn digest_without_file(change: impl FnMut(u64, &mut Inputs)) -> String {
-    run(BusAnalyzer::new(&scenario(), None, "").unwrap().with_digest(), 20, change).digest().unwrap()
+    run(
+        BusAnalyzer::new(&scenario(), None, "")
+            .unwrap()
+            .with_digest(),
+        20,
+        change,
+    )
+    .digest()
+    .unwrap()
 }
 
 #[test]
@@ -94,7 +135,10 @@ fn two_records_of_the_same_run_are_the_same_bytes() {
     for path in &paths {
         record(path, 20, |_, _| ());
     }
-    assert_eq!(std::fs::read(&paths[0]).unwrap(), std::fs::read(&paths[1]).unwrap());
+    assert_eq!(
+        std::fs::read(&paths[0]).unwrap(),
+        std::fs::read(&paths[1]).unwrap()
+    );
 }
 
 #[test]
@@ -127,16 +171,25 @@ fn a_transfer_that_is_missing_changes_the_digest() {
 #[test]
 fn the_order_in_which_boards_report_events_does_not_count() {
     let reference = digest_without_file(|_, _| ());
-    assert_eq!(digest_without_file(|_, inputs| inputs.mail.events.reverse()), reference);
+    assert_eq!(
+        digest_without_file(|_, inputs| inputs.mail.events.reverse()),
+        reference
+    );
 }
 
 #[test]
 fn a_message_that_is_a_whole_window_late_has_no_place_in_the_digest() {
-    let analyzer = run(BusAnalyzer::new(&scenario(), None, "").unwrap().with_digest(), 5, |k, inputs| {
-        if k == 4 {
-            inputs.mail.plant_probe[0].t = 0;
-        }
-    });
+    let analyzer = run(
+        BusAnalyzer::new(&scenario(), None, "")
+            .unwrap()
+            .with_digest(),
+        5,
+        |k, inputs| {
+            if k == 4 {
+                inputs.mail.plant_probe[0].t = 0;
+            }
+        },
+    );
     assert_eq!(analyzer.digest(), None);
 }
 
@@ -151,9 +204,19 @@ fn the_record_holds_every_message_and_the_scenario() {
     // 20 plant probes × 4, 19 control probes × 7, 38 events, 20 windows, URDF and task frame
     assert_eq!(stats.message_count, 20 * 4 + 19 * 7 + 38 + 20 + 2);
     assert_eq!((stats.attachment_count, stats.metadata_count), (1, 1));
-    assert_eq!(mcap::read::attachment(&file, &summary.attachment_indexes[0]).unwrap().data, &b"title = \"x\""[..]);
-    let metadata = mcap::read::metadata(&file, &summary.metadata_indexes[0]).unwrap().metadata;
-    assert_eq!((metadata["seed"].as_str(), metadata["duration_ns"].as_str()), ("1", "13000000000"));
+    assert_eq!(
+        mcap::read::attachment(&file, &summary.attachment_indexes[0])
+            .unwrap()
+            .data,
+        &b"title = \"x\""[..]
+    );
+    let metadata = mcap::read::metadata(&file, &summary.metadata_indexes[0])
+        .unwrap()
+        .metadata;
+    assert_eq!(
+        (metadata["seed"].as_str(), metadata["duration_ns"].as_str()),
+        ("1", "13000000000")
+    );
 }
 
 #[test]
@@ -170,10 +233,17 @@ fn a_record_cut_short_is_recovered_up_to_its_last_whole_chunk() {
         assert!(digest_file(&cut).is_err());
         let report = recover(&cut, &output).unwrap();
         assert!(!report.was_complete && report.gaps.is_empty(), "{report:?}");
-        assert!(report.messages >= last && report.bytes_lost < bytes.len() as u64, "{report:?}");
+        assert!(
+            report.messages >= last && report.bytes_lost < bytes.len() as u64,
+            "{report:?}"
+        );
         last = report.messages;
         let recovered = std::fs::read(&output).unwrap();
-        let stats = mcap::Summary::read(&recovered).unwrap().unwrap().stats.unwrap();
+        let stats = mcap::Summary::read(&recovered)
+            .unwrap()
+            .unwrap()
+            .stats
+            .unwrap();
         assert_eq!(stats.message_count, report.messages);
         assert_eq!((stats.attachment_count, stats.metadata_count), (1, 1));
         digest_file(&output).unwrap();
@@ -231,14 +301,18 @@ fn a_file_that_takes_no_more_ends_the_record_but_not_the_run() {
         let mut rest = vec![0; 200_000];
         reader.read_exact(&mut rest).unwrap();
     });
-    let analyzer = BusAnalyzer::new(&scenario(), Some(Path::new(&path)), "").unwrap().with_digest();
+    let analyzer = BusAnalyzer::new(&scenario(), Some(Path::new(&path)), "")
+        .unwrap()
+        .with_digest();
     let mut analyzer = analyzer;
     let mut out = Outputs::default();
     for k in 0..2000 {
         analyzer.step(0, &window(k), &mut out);
     }
     thread.join().unwrap();
-    let lost = analyzer.lost().expect("a pipe without a reader takes no more");
+    let lost = analyzer
+        .lost()
+        .expect("a pipe without a reader takes no more");
     assert!(lost.at > 0 && lost.reason.contains("Broken pipe"), "{lost}");
     assert_eq!(out.mail.events.len(), 1);
     assert!(analyzer.digest().is_some());
@@ -246,6 +320,8 @@ fn a_file_that_takes_no_more_ends_the_record_but_not_the_run() {
 
 #[test]
 fn a_record_that_cannot_be_created_is_refused_with_its_path() {
-    let error = BusAnalyzer::new(&scenario(), Some(Path::new("/nowhere/a.mcap")), "").err().unwrap();
+    let error = BusAnalyzer::new(&scenario(), Some(Path::new("/nowhere/a.mcap")), "")
+        .err()
+        .unwrap();
     assert!(error.contains("/nowhere/a.mcap"), "{error}");
 }

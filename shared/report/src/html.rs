@@ -2,12 +2,13 @@
 
 use crate::chart::charts;
 use crate::result::RunReport;
+use crate::svg;
 use crate::text::{
-    CHECK_HEADINGS, HEADINGS, LATENCY_HEADINGS, check_row, latency_rows, segments, sweep_table, verdict,
+    CHECK_HEADINGS, HEADINGS, LATENCY_HEADINGS, check_row, latency_rows, segments, sweep_table,
+    verdict,
 };
 use crate::trace::Ended;
 use crate::verdict::Verdict;
-use crate::svg;
 
 const TEMPLATE: &str = include_str!("html/template.html");
 const STYLE: &str = include_str!("html/style.css");
@@ -49,7 +50,9 @@ fn fill(template: &str, parts: &[(&str, String)]) -> String {
     let mut rest = template;
     while let Some((before, after)) = rest.split_once("{{") {
         out += before;
-        let Some((name, behind)) = after.split_once("}}") else { break };
+        let Some((name, behind)) = after.split_once("}}") else {
+            break;
+        };
         if let Some((_, text)) = parts.iter().find(|(known, _)| *known == name) {
             out += text;
         }
@@ -64,10 +67,24 @@ fn facts(report: &RunReport) -> String {
         format!("seed <b>{}</b>", report.seed),
         format!("<b>{}</b>", escape(&report.pacing)),
     ];
-    let simulated: f64 = report.variants.iter().map(|variant| variant.simulated_s).sum();
-    facts.push(format!("<b>{simulated:.1} s</b> simulated in {} runs", report.variants.len()));
-    let walls: Option<Vec<f64>> = report.variants.iter().map(|variant| variant.wall_s).collect();
-    if let Some(wall) = walls.map(|walls| walls.iter().sum::<f64>()).filter(|wall| *wall > 0.0) {
+    let simulated: f64 = report
+        .variants
+        .iter()
+        .map(|variant| variant.simulated_s)
+        .sum();
+    facts.push(format!(
+        "<b>{simulated:.1} s</b> simulated in {} runs",
+        report.variants.len()
+    ));
+    let walls: Option<Vec<f64>> = report
+        .variants
+        .iter()
+        .map(|variant| variant.wall_s)
+        .collect();
+    if let Some(wall) = walls
+        .map(|walls| walls.iter().sum::<f64>())
+        .filter(|wall| *wall > 0.0)
+    {
         facts.push(format!("<b>{:.0} ×</b> real time", simulated / wall));
     }
     facts.push(format!("vmerack {}", report.vmerack));
@@ -79,20 +96,29 @@ fn cards(report: &RunReport) -> String {
     let mut out = String::new();
     for (i, variant) in report.variants.iter().enumerate() {
         let judged = variant.checks.iter().filter(|check| check.passed.is_some());
-        let held = judged.clone().filter(|check| check.passed == Some(true)).count();
+        let held = judged
+            .clone()
+            .filter(|check| check.passed == Some(true))
+            .count();
         let means: Vec<String> = variant
             .segments
             .iter()
             .filter(|row| row.force_controlled)
-            .map(|row| row.mean_n.map_or_else(|| "–".into(), |mean| format!("{:.1}", mean + 0.0)))
+            .map(|row| {
+                row.mean_n
+                    .map_or_else(|| "–".into(), |mean| format!("{:.1}", mean + 0.0))
+            })
             .collect();
         let ended = match &variant.ended {
             Ended::Completed => format!("{held} of {} limits hold", judged.count()),
             Ended::Diverged { at_s } => format!("diverged at {at_s:.2} s"),
             Ended::Stopped { at_s, .. } => format!("stopped at {at_s:.2} s"),
         };
-        let findings: String =
-            variant.findings.iter().map(|finding| format!("<p class=finding>{}</p>", escape(finding))).collect();
+        let findings: String = variant
+            .findings
+            .iter()
+            .map(|finding| format!("<p class=finding>{}</p>", escape(finding)))
+            .collect();
         out += &format!(
             "<article class=card><h3><i class=swatch data-color={i}></i>{}<span class=\"pill {}\">{}</span></h3>\
              <p class=big>{}<small>N</small></p><p class=note>mean force of each force segment's last second</p>\
@@ -110,7 +136,12 @@ fn checks(report: &RunReport) -> String {
     let rows: Vec<_> = report
         .variants
         .iter()
-        .flat_map(|variant| variant.checks.iter().map(|check| check_row(&variant.name, check)))
+        .flat_map(|variant| {
+            variant
+                .checks
+                .iter()
+                .map(|check| check_row(&variant.name, check))
+        })
         .collect();
     if rows.is_empty() {
         return "<p class=note>The scenario sets no limits.</p>".into();
@@ -120,11 +151,22 @@ fn checks(report: &RunReport) -> String {
 
 fn segment_tables(report: &RunReport) -> String {
     let mut out = String::new();
-    if let Some(variant) = report.variants.iter().find(|variant| !variant.ideal.is_empty()) {
-        out += &format!("<h3>ideal impedance, one axis</h3>{}", table(&HEADINGS, &segments(&variant.ideal)));
+    if let Some(variant) = report
+        .variants
+        .iter()
+        .find(|variant| !variant.ideal.is_empty())
+    {
+        out += &format!(
+            "<h3>ideal impedance, one axis</h3>{}",
+            table(&HEADINGS, &segments(&variant.ideal))
+        );
     }
     for variant in &report.variants {
-        out += &format!("<h3>{}</h3>{}", escape(&variant.name), table(&HEADINGS, &segments(&variant.segments)));
+        out += &format!(
+            "<h3>{}</h3>{}",
+            escape(&variant.name),
+            table(&HEADINGS, &segments(&variant.segments))
+        );
         if let Some(digest) = &variant.digest {
             out += &format!("<p class=note>digest <code>{}</code></p>", escape(digest));
         }
@@ -164,7 +206,10 @@ fn latencies(report: &RunReport) -> String {
 }
 
 fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
-    let head: String = headings.iter().map(|heading| format!("<th>{}</th>", escape(heading))).collect();
+    let head: String = headings
+        .iter()
+        .map(|heading| format!("<th>{}</th>", escape(heading)))
+        .collect();
     let body: String = rows
         .iter()
         .map(|row| {
@@ -183,7 +228,9 @@ fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
             format!("<tr>{cells}</tr>")
         })
         .collect();
-    format!("<div class=scroll><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>")
+    format!(
+        "<div class=scroll><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+    )
 }
 
 fn class(verdict: Verdict) -> &'static str {
@@ -194,11 +241,17 @@ fn class(verdict: Verdict) -> &'static str {
 }
 
 fn paragraphs(text: &str) -> String {
-    text.split("\n\n").filter(|part| !part.trim().is_empty()).map(|part| format!("<p>{}</p>", escape(part.trim()))).collect()
+    text.split("\n\n")
+        .filter(|part| !part.trim().is_empty())
+        .map(|part| format!("<p>{}</p>", escape(part.trim())))
+        .collect()
 }
 
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -208,6 +261,9 @@ mod tests {
     #[test]
     fn text_from_a_scenario_cannot_become_markup() {
         assert_eq!(escape("<b>&\"</b>"), "&lt;b&gt;&amp;&quot;&lt;/b&gt;");
-        assert_eq!(fill("{{a}}-{{b}}", &[("a", "{{b}}".into()), ("b", "x".into())]), "{{b}}-x");
+        assert_eq!(
+            fill("{{a}}-{{b}}", &[("a", "{{b}}".into()), ("b", "x".into())]),
+            "{{b}}-x"
+        );
     }
 }

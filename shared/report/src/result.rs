@@ -65,9 +65,12 @@ impl VariantResult {
     ) -> Result<VariantResult, String> {
         let axis = scenario.report.force_axis;
         let segments = scenario.resolved_segments();
-        let plant = |f: &dyn Fn(&messages::PlantProbe) -> f64| series(trace.plant.iter().map(|probe| (probe.t, f(probe))));
-        let control =
-            |f: &dyn Fn(&messages::ControlProbe) -> f64| series(trace.control.iter().map(|probe| (probe.t, f(probe))));
+        let plant = |f: &dyn Fn(&messages::PlantProbe) -> f64| {
+            series(trace.plant.iter().map(|probe| (probe.t, f(probe))))
+        };
+        let control = |f: &dyn Fn(&messages::ControlProbe) -> f64| {
+            series(trace.control.iter().map(|probe| (probe.t, f(probe))))
+        };
         let force = plant(&|probe| probe.contact[axis]);
         let position = plant(&|probe| probe.position[axis]);
         let target = control(&|probe| probe.xt[axis]);
@@ -76,7 +79,10 @@ impl VariantResult {
             Ended::Completed => reached_s,
             Ended::Diverged { at_s } | Ended::Stopped { at_s, .. } => at_s.min(reached_s),
         };
-        let ideal = scenario.report.ideal.then(|| ideal(scenario, &segments, axis, &desired, until));
+        let ideal = scenario
+            .report
+            .ideal
+            .then(|| ideal(scenario, &segments, axis, &desired, until));
         let contact = first_contact(trace);
         let segment_rows = rows(
             &segments,
@@ -91,9 +97,18 @@ impl VariantResult {
                 until,
             },
         );
-        let ideal_rows = ideal.as_ref().map_or_else(Vec::new, |ideal| ideal_rows(&segments, axis, ideal, &desired, until));
+        let ideal_rows = ideal.as_ref().map_or_else(Vec::new, |ideal| {
+            ideal_rows(&segments, axis, ideal, &desired, until)
+        });
         let bounds = Bounds::of(scenario)?;
-        let run = RunMeasures::of(trace, &segment_rows, &force, ideal.as_ref().map(|ideal| &ideal.force), &bounds, until);
+        let run = RunMeasures::of(
+            trace,
+            &segment_rows,
+            &force,
+            ideal.as_ref().map(|ideal| &ideal.force),
+            &bounds,
+            until,
+        );
         let checks = checks(scenario, variant, &ended, &segment_rows, &run);
         let mut bad = checks.iter().any(|check| check.passed == Some(false));
         let mut findings = Vec::new();
@@ -101,34 +116,64 @@ impl VariantResult {
             Ended::Completed => {}
             Ended::Diverged { at_s } => {
                 bad |= !variant.may_diverge;
-                findings.push(format!("diverged at {at_s:.3} s{}", expected(variant.may_diverge)));
+                findings.push(format!(
+                    "diverged at {at_s:.3} s{}",
+                    expected(variant.may_diverge)
+                ));
             }
             Ended::Stopped { at_s, reason } => {
                 bad = true;
                 findings.push(format!("stopped at {at_s:.3} s: {reason}"));
             }
         }
-        let pushes = segment_rows.iter().any(|row| row.reached && row.commanded_n.is_some_and(|wanted| wanted > 0.0));
+        let pushes = segment_rows
+            .iter()
+            .any(|row| row.reached && row.commanded_n.is_some_and(|wanted| wanted > 0.0));
         if pushes && contact.is_none() && !scenario.surfaces.is_empty() {
             bad |= !variant.may_miss_surface;
-            findings.push(format!("never touched the surface{}", expected(variant.may_miss_surface)));
+            findings.push(format!(
+                "never touched the surface{}",
+                expected(variant.may_miss_surface)
+            ));
         }
-        let acted = |bit: u32| trace.control.iter().filter(|probe| probe.limits & bit != 0).count();
+        let acted = |bit: u32| {
+            trace
+                .control
+                .iter()
+                .filter(|probe| probe.limits & bit != 0)
+                .count()
+        };
         for (bit, what) in [
-            (messages::limits::TARGET_ERROR, "the limit on |Xᵗ − X| acted"),
+            (
+                messages::limits::TARGET_ERROR,
+                "the limit on |Xᵗ − X| acted",
+            ),
             (messages::limits::TORQUE, "a joint torque was saturated"),
         ] {
             if acted(bit) > 0 {
-                findings.push(format!("{what} in {} of {} control jobs", acted(bit), trace.control.len()));
+                findings.push(format!(
+                    "{what} in {} of {} control jobs",
+                    acted(bit),
+                    trace.control.len()
+                ));
             }
         }
         if ledger.errors() > 0 {
-            findings.push(format!("{} bus transfers ended in BERR* or time-out", ledger.errors()));
+            findings.push(format!(
+                "{} bus transfers ended in BERR* or time-out",
+                ledger.errors()
+            ));
         }
-        let torque = std::array::from_fn(|i| control(&|probe| 100.0 * probe.torque[i] / bounds.torque_nm[i]));
+        let torque = std::array::from_fn(|i| {
+            control(&|probe| 100.0 * probe.torque[i] / bounds.torque_nm[i])
+        });
         Ok(VariantResult {
             name: variant.name.clone(),
-            verdict: if bad { Verdict::Failed } else { Verdict::Passed },
+            verdict: if bad {
+                Verdict::Failed
+            } else {
+                Verdict::Passed
+            },
             ended,
             findings,
             simulated_s: until,
@@ -142,13 +187,23 @@ impl VariantResult {
             measured: Vec::new(),
             record: None,
             digest: None,
-            curves: Curves { force, position, target, torque, ideal: ideal.unwrap_or_default() },
+            curves: Curves {
+                force,
+                position,
+                target,
+                torque,
+                ideal: ideal.unwrap_or_default(),
+            },
         })
     }
 }
 
 fn expected(is: bool) -> &'static str {
-    if is { " (expected of this variant)" } else { "" }
+    if is {
+        " (expected of this variant)"
+    } else {
+        ""
+    }
 }
 
 fn series(samples: impl Iterator<Item = (vme::Ns, f64)>) -> Series {
@@ -166,7 +221,13 @@ fn ideal_rows(
     desired: &Series,
     until: f64,
 ) -> Vec<SegmentRow> {
-    let contact = ideal.force.t.iter().zip(&ideal.force.y).find(|(_, force)| **force > 0.0).map(|(t, _)| *t);
+    let contact = ideal
+        .force
+        .t
+        .iter()
+        .zip(&ideal.force.y)
+        .find(|(_, force)| **force > 0.0)
+        .map(|(t, _)| *t);
     let signals = Signals {
         force: &ideal.force,
         position: &ideal.position,
@@ -255,7 +316,13 @@ pub struct WriteError {
 
 impl RunReport {
     /// Puts the results together.
-    pub fn new(name: &str, scenario: &Scenario, pacing: &str, variants: Vec<VariantResult>, sweeps: Vec<Sweep>) -> RunReport {
+    pub fn new(
+        name: &str,
+        scenario: &Scenario,
+        pacing: &str,
+        variants: Vec<VariantResult>,
+        sweeps: Vec<Sweep>,
+    ) -> RunReport {
         RunReport {
             schema_version: SCHEMA_VERSION,
             vmerack: env!("CARGO_PKG_VERSION"),
@@ -264,8 +331,15 @@ impl RunReport {
             description: scenario.description.clone(),
             seed: scenario.seed,
             pacing: pacing.to_owned(),
-            axis: ["x", "y", "z"].get(scenario.report.force_axis).copied().unwrap_or("?"),
-            verdict: variants.iter().map(|variant| variant.verdict).max().unwrap_or(Verdict::Failed),
+            axis: ["x", "y", "z"]
+                .get(scenario.report.force_axis)
+                .copied()
+                .unwrap_or("?"),
+            verdict: variants
+                .iter()
+                .map(|variant| variant.verdict)
+                .max()
+                .unwrap_or(Verdict::Failed),
             variants,
             sweeps,
         }
@@ -281,10 +355,15 @@ impl RunReport {
         let write = |name: &str, content: Result<String, String>| {
             let path = folder.join(name);
             content
-                .and_then(|content| std::fs::write(&path, content).map_err(|error| error.to_string()))
+                .and_then(|content| {
+                    std::fs::write(&path, content).map_err(|error| error.to_string())
+                })
                 .map_err(|reason| WriteError { path, reason })
         };
-        write("report.json", self.json().map_err(|error| error.to_string()))?;
+        write(
+            "report.json",
+            self.json().map_err(|error| error.to_string()),
+        )?;
         write("report.html", crate::html::render(self))
     }
 }

@@ -17,7 +17,11 @@ pub struct Trace {
 impl Trace {
     /// Room for a run of that many windows.
     pub fn with_capacity(windows: usize) -> Trace {
-        Trace { plant: Vec::with_capacity(windows), control: Vec::with_capacity(windows), events: Vec::with_capacity(64) }
+        Trace {
+            plant: Vec::with_capacity(windows),
+            control: Vec::with_capacity(windows),
+            events: Vec::with_capacity(64),
+        }
     }
 
     /// Adds what was heard in one window.

@@ -75,7 +75,12 @@ pub(crate) fn checks(
         }
         if !of_segments(limit.measure) {
             let cut_short = rows.iter().any(|row| !row.reached);
-            checks.push(check(limit, None, run.value(limit.measure, None), cut_short && excused(ended, variant)));
+            checks.push(check(
+                limit,
+                None,
+                run.value(limit.measure, None),
+                cut_short && excused(ended, variant),
+            ));
             continue;
         }
         let chosen = |row: &&SegmentRow| match limit.segments.is_empty() {
@@ -84,7 +89,12 @@ pub(crate) fn checks(
         };
         for row in rows.iter().filter(chosen) {
             let unjudged = !row.reached && excused(ended, variant);
-            checks.push(check(limit, Some(&row.name), run.value(limit.measure, Some(row)), unjudged));
+            checks.push(check(
+                limit,
+                Some(&row.name),
+                run.value(limit.measure, Some(row)),
+                unjudged,
+            ));
         }
     }
     checks
@@ -100,7 +110,9 @@ fn excused(ended: &Ended, variant: &Variant) -> bool {
 }
 
 fn check(limit: &Limit, segment: Option<&str>, value: Option<f64>, unjudged: bool) -> Check {
-    let holds = |value: f64| limit.min.is_none_or(|min| value >= min) && limit.max.is_none_or(|max| value <= max);
+    let holds = |value: f64| {
+        limit.min.is_none_or(|min| value >= min) && limit.max.is_none_or(|max| value <= max)
+    };
     Check {
         measure: limit.measure,
         segment: segment.map(str::to_owned),

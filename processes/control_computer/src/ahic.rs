@@ -42,9 +42,7 @@ pub fn target_acceleration(
     let (xd_dot, xd_ddot) = (&xd.twist, &xd.acceleration);
     let x = difference(xt, &xd.pose);
     Spatial::from_fn(|i, _| {
-        (-fe[i] + (1.0 - s[i]) * fd[i]
-            - b[i] * (xt_dot[i] - s[i] * xd_dot[i])
-            - k[i] * s[i] * x[i])
+        (-fe[i] + (1.0 - s[i]) * fd[i] - b[i] * (xt_dot[i] - s[i] * xd_dot[i]) - k[i] * s[i] * x[i])
             / m[i]
             + s[i] * xd_ddot[i]
     })
@@ -94,13 +92,8 @@ mod tests {
         let xd = Motion::at_rest(pose(Vector3::zeros(), Vector3::zeros()));
         for angle in [0.1, 1.0, 2.0, 3.0] {
             let xt = pose(Vector3::zeros(), Vector3::new(0.0, angle, 0.0));
-            let a = target_acceleration(
-                &impedance(),
-                &xd,
-                &xt,
-                &Spatial::zeros(),
-                &Spatial::zeros(),
-            );
+            let a =
+                target_acceleration(&impedance(), &xd, &xt, &Spatial::zeros(), &Spatial::zeros());
             assert!((a[4] + 25.0 * angle).abs() < 1e-9, "{angle}: {}", a[4]);
         }
     }

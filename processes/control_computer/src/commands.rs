@@ -141,7 +141,10 @@ mod tests {
     #[test]
     fn a_sound_command_becomes_its_segment() {
         let segment = segment(&command()).unwrap();
-        assert_eq!((segment.index, segment.start, segment.move_time), (3, 1_000, 2_000));
+        assert_eq!(
+            (segment.index, segment.start, segment.move_time),
+            (3, 1_000, 2_000)
+        );
         assert_eq!(segment.path, PathKind::Line);
         assert_eq!(segment.impedance.force[2], 20.0);
         // a turn about y by 2·acos 0.8

@@ -55,8 +55,7 @@ impl JointLimits {
                 continue;
             }
             let s = ((q[i] - edge).abs() / self.buffer).min(1.0);
-            task.weight[i] =
-                self.max_weight * 0.5 * (1.0 - libm::cos(std::f64::consts::PI * s));
+            task.weight[i] = self.max_weight * 0.5 * (1.0 - libm::cos(std::f64::consts::PI * s));
             task.acceleration[i] = self.kp * (edge - q[i]) - 2.0 * self.kp.sqrt() * qd[i];
         }
         task

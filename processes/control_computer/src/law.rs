@@ -80,10 +80,7 @@ impl Law {
             selection: Spatial::repeat(1.0),
             mass: six(rest.mass_kg, rest.rotational_mass_kg_m2),
             damping: six(rest.damping_ns_per_m, rest.rotational_damping_nms_per_rad),
-            stiffness: six(
-                rest.stiffness_n_per_m,
-                rest.rotational_stiffness_nm_per_rad,
-            ),
+            stiffness: six(rest.stiffness_n_per_m, rest.rotational_stiffness_nm_per_rad),
             force: Spatial::zeros(),
         };
         let start = Pose {
@@ -195,7 +192,13 @@ impl Law {
 
     /// Carries Xᵗ on to the next job, `dt` seconds later. While torques are cut the tool cannot follow, and Xᵗ may not
     /// get further away from it than it is.
-    pub fn carry_on(&mut self, decided: &Decided, tool: &TaskKinematics, torque_cut: bool, dt: f64) {
+    pub fn carry_on(
+        &mut self,
+        decided: &Decided,
+        tool: &TaskKinematics,
+        torque_cut: bool,
+        dt: f64,
+    ) {
         let Some(target) = &mut self.target else {
             return;
         };

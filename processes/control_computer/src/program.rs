@@ -193,7 +193,14 @@ impl BusProgram {
     }
 
     /// The words that the job's writes carry.
-    pub fn words(&self, rest: Rest, task: u16, job: u32, codes: &[u32; JOINTS], out: &mut Vec<BusWord>) {
+    pub fn words(
+        &self,
+        rest: Rest,
+        task: u16,
+        job: u32,
+        codes: &[u32; JOINTS],
+        out: &mut Vec<BusWord>,
+    ) {
         for (i, &write) in rest.writes().iter().enumerate() {
             out.push(BusWord {
                 t: 0,

@@ -188,10 +188,7 @@ mod tests {
     #[test]
     fn a_hold_stays_until_acknowledged() {
         let mut safety = Safety::new();
-        assert_eq!(
-            safety.decide(1, &Signs { hold: true, ..FINE }),
-            State::Hold
-        );
+        assert_eq!(safety.decide(1, &Signs { hold: true, ..FINE }), State::Hold);
         assert_eq!(safety.decide(2, &FINE), State::Hold);
         let acknowledged = Signs {
             acknowledge: true,

@@ -18,6 +18,9 @@ const FORCE_INVALID: u32 = (force::ERROR_MEMORY
     | force::ERROR_CRC
     | force::ERROR_WATCHDOG) as u32;
 
+/// Bits of the six force words among those that came.
+const FORCE_WORDS: u32 = 0x3F << FORCES;
+
 /// What a job knows of the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensed {
@@ -34,7 +37,7 @@ pub struct Sensed {
 pub struct Sensors {
     /// Words of the job under way.
     words: [BusWord; READS],
-    /// Bit i: word i came in this job.
+    /// Bit i: word i came in this job and is valid.
     came: u32,
     job: u32,
     /// Jobs in a row in which word i did not come.
@@ -115,18 +118,20 @@ impl Sensors {
 
     /// Decodes the words of `job`. Returns the first read that has just failed, if any.
     pub fn read(&mut self, job: u32) -> Option<usize> {
-        if self.job != job {
-            self.came = 0;
+        let came = if self.job == job { self.came } else { 0 };
+        self.came = came;
+        if self.has(ERRORS) && self.words[ERRORS].value & FORCE_INVALID != 0 {
+            self.came &= !FORCE_WORDS;
         }
         let mut failed = None;
-        for (index, held) in self.held.iter_mut().enumerate() {
-            if self.came & (1 << index) != 0 {
-                *held = 0;
+        for index in 0..READS {
+            self.held[index] = if self.has(index) {
+                0
             } else {
-                *held += 1;
-                if *held == 1 {
-                    failed = failed.or(Some(index));
-                }
+                self.held[index] + 1
+            };
+            if failed.is_none() && came & (1 << index) == 0 && self.held[index] == 1 {
+                failed = Some(index);
             }
         }
         for joint in 0..JOINTS {
@@ -188,12 +193,9 @@ impl Sensors {
     }
 
     fn read_force(&mut self) {
-        let invalid = self.has(ERRORS) && self.words[ERRORS].value & FORCE_INVALID != 0;
         for axis in 0..6 {
             let at = FORCES + axis;
-            if invalid {
-                self.held[at] = self.held[at].max(self.held[ERRORS]) + 1;
-            } else if self.has(at) {
+            if self.has(at) {
                 let value = self.words[at].value;
                 let counts = if self.wide_force {
                     f64::from(value as i32)
@@ -212,18 +214,27 @@ impl Sensors {
     }
 }
 
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn scenario(overrides: &[&str]) -> Scenario {
         let overrides: Vec<String> = overrides.iter().map(|o| o.to_string()).collect();
-        scenario::load("table-5-3", &overrides).unwrap().scenario().unwrap()
+        scenario::load("table-5-3", &overrides)
+            .unwrap()
+            .scenario()
+            .unwrap()
     }
 
     fn word(job: u32, index: usize, value: u32, t: Ns) -> BusWord {
-        BusWord { t, addr: 0, value, job, task: 0, index: index as u16 }
+        BusWord {
+            t,
+            addr: 0,
+            value,
+            job,
+            task: 0,
+            index: index as u16,
+        }
     }
 
     /// All words of a job: these counts, zero elsewhere.
@@ -284,8 +295,17 @@ mod tests {
         let before = *sensors.sensed();
         for job in 1..=3 {
             for index in (0..READS).filter(|&index| index != COUNTS + 4) {
-                let value = if index == STATUS { 1 } else { (counts[index.min(13) / 2] + 10) as u32 };
-                let value = if (FORCES..STATUS).contains(&index) || index % 2 == 1 && index < FORCES { 0 } else { value };
+                let value = if index == STATUS {
+                    1
+                } else {
+                    (counts[index.min(13) / 2] + 10) as u32
+                };
+                let value = if (FORCES..STATUS).contains(&index) || index % 2 == 1 && index < FORCES
+                {
+                    0
+                } else {
+                    value
+                };
                 sensors.take(&word(job, index, value, 0));
             }
             // only the first miss in a row is news
@@ -303,8 +323,12 @@ mod tests {
     fn under_a_receiver_error_the_force_is_held_but_saturation_is_not_such_an_error() {
         let mut sensors = Sensors::new(&scenario(&[])).unwrap();
         let counts = sensors.counts;
-        for (job, errors, force, held) in [(0, 0, 100.0, 0), (1, u32::from(force::ERROR_CRC), 100.0, 1),
-            (2, u32::from(force::ERROR_CRC), 100.0, 2), (3, 0x3F, 300.0, 0)] {
+        for (job, errors, force, held) in [
+            (0, 0, 100.0, 0),
+            (1, u32::from(force::ERROR_CRC), 100.0, 1),
+            (2, u32::from(force::ERROR_CRC), 100.0, 2),
+            (3, 0x3F, 300.0, 0),
+        ] {
             give(&mut sensors, job, counts, 0);
             let newtons = f64::from(job) * 100.0 / 3.0 * 2.0 + 100.0;
             sensors.take(&word(job, FORCES, (newtons / 400.0 * 16384.0) as u32, 0));
@@ -318,9 +342,16 @@ mod tests {
     #[test]
     fn the_age_of_a_force_sample_follows_from_its_counter_across_its_wrap() {
         // filter 4 publishes every 32 ms; its counter wraps after 2097 s
-        let mut sensors = Sensors::new(&scenario(&["force_sensor_if.filter={ cascade = 4 }"])).unwrap();
+        let mut sensors =
+            Sensors::new(&scenario(&["force_sensor_if.filter={ cascade = 4 }"])).unwrap();
         let counts = sensors.counts;
-        for (job, (t, published)) in [(70_000_000, 64_000_000), (2_097_200_000_000, 2_097_184_000_000)].into_iter().enumerate() {
+        for (job, (t, published)) in [
+            (70_000_000, 64_000_000),
+            (2_097_200_000_000, 2_097_184_000_000),
+        ]
+        .into_iter()
+        .enumerate()
+        {
             give(&mut sensors, job as u32, counts, t);
             let counter = (published / 32_000_000) as u16;
             sensors.take(&word(job as u32, COUNTER, counter.into(), t));

@@ -245,10 +245,17 @@ mod tests {
     fn paths_begin_and_end_at_rest_in_the_poses_asked_for() {
         for path in [PathKind::PointToPoint, PathKind::Line] {
             let trajectory = moving(path);
-            for (at, pose) in [(SECOND, start()), (3 * SECOND, target()), (9 * SECOND, target())] {
+            for (at, pose) in [
+                (SECOND, start()),
+                (3 * SECOND, target()),
+                (9 * SECOND, target()),
+            ] {
                 let x = trajectory.desired(at);
                 assert!(difference(&x.pose, &pose).amax() < 1e-12);
-                assert!(x.twist.amax() < 1e-12 && x.acceleration.amax() < 1e-12, "{path:?} {at}");
+                assert!(
+                    x.twist.amax() < 1e-12 && x.acceleration.amax() < 1e-12,
+                    "{path:?} {at}"
+                );
             }
         }
     }
@@ -260,13 +267,23 @@ mod tests {
             let h = 1_000_000;
             for k in 1..200 {
                 let t = SECOND + k * 10_000_000;
-                let (before, x, after) =
-                    (trajectory.desired(t - h), trajectory.desired(t), trajectory.desired(t + h));
+                let (before, x, after) = (
+                    trajectory.desired(t - h),
+                    trajectory.desired(t),
+                    trajectory.desired(t + h),
+                );
                 let dt = h as f64 * 1e-9;
                 let speed = difference(&after.pose, &before.pose) / (2.0 * dt);
-                assert!((speed - x.twist).amax() < 1e-4, "{path:?} {k}: {speed} {}", x.twist);
+                assert!(
+                    (speed - x.twist).amax() < 1e-4,
+                    "{path:?} {k}: {speed} {}",
+                    x.twist
+                );
                 let acceleration = (after.twist - before.twist) / (2.0 * dt);
-                assert!((acceleration - x.acceleration).amax() < 1e-3, "{path:?} {k}");
+                assert!(
+                    (acceleration - x.acceleration).amax() < 1e-3,
+                    "{path:?} {k}"
+                );
             }
         }
     }
@@ -285,8 +302,14 @@ mod tests {
 
     #[test]
     fn hold_stays_and_step_jumps() {
-        assert_eq!(moving(PathKind::Hold).desired(5 * SECOND), Motion::at_rest(start()));
-        assert_eq!(moving(PathKind::Step).desired(SECOND), Motion::at_rest(target()));
+        assert_eq!(
+            moving(PathKind::Hold).desired(5 * SECOND),
+            Motion::at_rest(start())
+        );
+        assert_eq!(
+            moving(PathKind::Step).desired(SECOND),
+            Motion::at_rest(target())
+        );
     }
 
     #[test]
@@ -296,11 +319,17 @@ mod tests {
         trajectory.push(segment(1, 2 * SECOND, PathKind::PointToPoint, start()));
         assert_eq!(trajectory.last_start(), 2 * SECOND);
         assert_eq!(trajectory.start_due(SECOND - 1), None);
-        assert_eq!((trajectory.segment(), trajectory.impedance().mass[0]), (None, 9.0));
+        assert_eq!(
+            (trajectory.segment(), trajectory.impedance().mass[0]),
+            (None, 9.0)
+        );
         assert_eq!(trajectory.start_due(SECOND + 5), Some(0));
         let half_way = trajectory.desired(2 * SECOND).pose;
         assert_eq!(trajectory.start_due(2 * SECOND + 5), Some(1));
-        assert_eq!((trajectory.segment(), trajectory.impedance().mass[0]), (Some(1), 2.0));
+        assert_eq!(
+            (trajectory.segment(), trajectory.impedance().mass[0]),
+            (Some(1), 2.0)
+        );
         assert_eq!(trajectory.desired(2 * SECOND).pose, half_way);
     }
 
@@ -313,8 +342,7 @@ mod tests {
                 trajectory.push(segment(i, round, PathKind::Hold, start()));
             }
             assert!(!trajectory.has_room());
-            let started: Vec<u32> =
-                std::iter::from_fn(|| trajectory.start_due(round)).collect();
+            let started: Vec<u32> = std::iter::from_fn(|| trajectory.start_due(round)).collect();
             assert!(started.into_iter().eq(0..QUEUE as u32));
         }
     }

@@ -3,8 +3,10 @@
 //! Every point that can touch has a tangential bristle ([`crate::state::State::contact`]): Coulomb friction with true
 //! stick–slip. Its deflection is cut to what μN can hold before it is used, so a wrench is a function of the state alone.
 
+mod peg;
 mod plane;
 
+pub use peg::PegInHole;
 pub use plane::Plane;
 
 use arm::{Pose, Spatial};
@@ -15,6 +17,8 @@ use nalgebra::Vector3;
 pub enum Contact {
     /// A flat patch under the tool point.
     Plane(Plane),
+    /// A peg on the tool and its hole.
+    Peg(PegInHole),
 }
 
 /// Contact of the tool with its surroundings at one instant.
@@ -56,6 +60,23 @@ impl Contact {
     pub fn points(&self) -> usize {
         match self {
             Contact::Plane(_) => 1,
+            Contact::Peg(_) => peg::POINTS,
+        }
+    }
+
+    /// What it is made of.
+    pub fn material(&self) -> &Material {
+        match self {
+            Contact::Plane(plane) => &plane.material,
+            Contact::Peg(peg) => &peg.material,
+        }
+    }
+
+    /// Keeps the dampers of all points together below this, Ns/m.
+    pub fn limit_damping(&mut self, limit: f64) {
+        match self {
+            Contact::Plane(plane) => plane.material.damping_limit = limit,
+            Contact::Peg(peg) => peg.material.damping_limit = limit / peg::POINTS as f64,
         }
     }
 
@@ -69,6 +90,7 @@ impl Contact {
     ) {
         match self {
             Contact::Plane(plane) => plane.add_to(touch, pose, twist, &bristles[0]),
+            Contact::Peg(peg) => peg.add_to(touch, pose, twist, bristles),
         }
     }
 
@@ -83,6 +105,7 @@ impl Contact {
     ) {
         match self {
             Contact::Plane(plane) => plane.advance(&mut bristles[0], pose, twist, moving, h),
+            Contact::Peg(peg) => peg.advance(bristles, pose, twist, moving, h),
         }
     }
 }
@@ -96,6 +119,8 @@ pub struct Material {
     pub hunt_crossley: f64,
     /// μ.
     pub friction: f64,
+    /// Strongest damper, Ns/m: 1.5 c k x counts up to here. [`crate::plant::Plant::new`] sets what a step can resolve.
+    pub damping_limit: f64,
 }
 
 /// Damper beside the tangential spring over its stiffness, s.
@@ -108,7 +133,8 @@ impl Material {
         if x <= 0.0 {
             return 0.0;
         }
-        (self.stiffness * x * (1.0 + 1.5 * self.hunt_crossley * rate)).max(0.0)
+        let spring = self.stiffness * x;
+        (spring + (1.5 * self.hunt_crossley * spring).min(self.damping_limit) * rate).max(0.0)
     }
 
     /// What remains of a tangential deflection under the normal force `normal`. Tangentially as stiff as normally.

@@ -148,9 +148,9 @@ impl Drive {
         theta
     }
 
-    /// Stiffest element on the rotor, Nm/rad: transmission and friction bristle, or the brake with them.
-    pub fn rotor_stiffness(&self) -> f64 {
-        self.stiffness + self.friction.stiffness() + self.brake.stiffness
+    /// Stiffness of the sticking friction and the engaged brake together, Nm/rad.
+    pub fn holding_stiffness(&self) -> f64 {
+        self.friction.stiffness() + self.brake.stiffness
     }
 }
 

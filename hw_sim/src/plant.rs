@@ -7,7 +7,7 @@ use crate::contact::{Contact, Plane, Touch};
 use crate::drive::{Drive, RotorLoss, Transmission};
 use crate::sensor::Sensor;
 use crate::state::{CONTACT_POINTS, State};
-use arm::{ArmModel, ArmState, DOF, JointVector, Pose, Spatial};
+use arm::{ArmModel, ArmState, DOF, JointMatrix, JointVector, Pose, Spatial};
 use messages::AmplifierCommand;
 use scenario::{Joints, Scenario};
 
@@ -25,6 +25,13 @@ pub struct Plant {
     /// Strain gauges between flange and tool.
     pub sensor: Sensor,
 }
+
+/// Largest angle by which the fastest oscillation may turn in one step: semi-implicit Euler is stable below 2, Runge–Kutta
+/// below 2.8; the rest is for postures in which the arm is lighter than at the start.
+const LARGEST_PHASE_STEP: f64 = 1.0;
+
+/// Share of the tool's speed into a surface that the contact's damper may take in one step.
+const LARGEST_DAMPER_STEP: f64 = 0.5;
 
 /// What the amplifiers and brakes are told.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -98,7 +105,7 @@ impl Plant {
                 "the surfaces have {points} contact points, expected at most {CONTACT_POINTS}"
             ));
         }
-        let plant = Plant {
+        let mut plant = Plant {
             drives: std::array::from_fn(|i| {
                 Drive::new(
                     &data.joints[i],
@@ -113,7 +120,75 @@ impl Plant {
             arm,
         };
         let state = plant.braked_at_rest(q);
+        let (rate, mobility) = (scenario.plant.rate_hz, plant.tool_mobility(&q, &rotors));
+        let fastest = plant.fastest_frequency(&q, &rotors, mobility);
+        let least = fastest / LARGEST_PHASE_STEP;
+        // no frequency is no answer either
+        if least.is_nan() || rate < least {
+            return Err(format!(
+                "plant.rate_hz = {rate}: drives, brakes and surfaces of this stiffness swing at up to {:.0} Hz and need at least {least:.0} steps a second",
+                fastest / std::f64::consts::TAU
+            ));
+        }
+        for contact in &mut plant.contacts {
+            contact.limit_damping(LARGEST_DAMPER_STEP * rate / mobility);
+        }
         Ok((plant, state))
+    }
+
+    /// Mass matrix of what moves with the links.
+    fn moving_mass(&self, q: &JointVector, rotors: &JointVector) -> JointMatrix {
+        let mut mass = arm::crba(&self.arm, q);
+        if self.joints == Joints::Rigid {
+            for i in 0..DOF {
+                mass[(i, i)] += rotors[i];
+            }
+        }
+        mass
+    }
+
+    /// Sum of the reciprocal masses that forces on the tool along x, y and z feel, 1/kg.
+    fn tool_mobility(&self, q: &JointVector, rotors: &JointVector) -> f64 {
+        let Some(inverse) = self.moving_mass(q, rotors).try_inverse() else {
+            return f64::NAN;
+        };
+        let jacobian = arm::jacobian(&self.arm, q);
+        (0..3)
+            .map(|k| (jacobian.row(k) * inverse * jacobian.row(k).transpose())[0])
+            .sum()
+    }
+
+    /// Upper bound of the natural frequencies at a posture, rad/s: everything sticks and the tool is in contact. The sum of
+    /// the bounds of each kind of spring (Weyl).
+    fn fastest_frequency(&self, q: &JointVector, rotors: &JointVector, tool_mobility: f64) -> f64 {
+        let Some(inverse) = self.moving_mass(q, rotors).try_inverse() else {
+            return f64::NAN;
+        };
+        let flexible = self.joints == Joints::Flexible;
+        let on_link = |drive: &Drive| {
+            if flexible {
+                drive.stiffness
+            } else {
+                drive.holding_stiffness()
+            }
+        };
+        let on_rotor = |drive: &Drive| {
+            if flexible {
+                (drive.stiffness + drive.holding_stiffness()) / drive.rotor
+            } else {
+                0.0
+            }
+        };
+        let links: f64 = (0..DOF)
+            .map(|i| on_link(&self.drives[i]) * inverse[(i, i)])
+            .sum();
+        let rotors = self.drives.iter().map(on_rotor).fold(0.0, f64::max);
+        let surface = self
+            .contacts
+            .iter()
+            .map(|contact| contact.material().stiffness)
+            .fold(0.0, f64::max);
+        (links + rotors + tool_mobility * surface).sqrt()
     }
 
     /// At rest with every brake engaged and carrying the arm's weight: nothing moves when time starts.

@@ -48,7 +48,7 @@ impl State {
     pub fn out_of_domain(&self, speed_limit: f64) -> Option<(usize, f64)> {
         for i in 0..arm::DOF {
             for speed in [self.qd[i], self.theta_dot[i]] {
-                if !(speed.abs() <= speed_limit) {
+                if speed.is_nan() || speed.abs() > speed_limit {
                     return Some((i, speed));
                 }
             }

@@ -231,7 +231,7 @@ impl Board for BusAnalyzer {
         if recorded && let Some(lost) = &self.lost {
             out.mail.events.push(Event::new(
                 lost.at,
-                EventKind::MessageLost,
+                EventKind::RecordLost,
                 Severity::Error,
                 0.0,
                 0.0,

@@ -38,4 +38,5 @@ pub const ROUTES: &[Route] = &[
     Route { from: EncoderIf, kind: Kind::Events, to: &[BusAnalyzer, Chassis] },
     Route { from: ControlComputer, kind: Kind::Events, to: &[BusAnalyzer, Chassis] },
     Route { from: Workstation, kind: Kind::Events, to: &[BusAnalyzer, Chassis] },
+    Route { from: BusAnalyzer, kind: Kind::Events, to: &[Chassis] },
 ];

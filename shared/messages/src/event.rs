@@ -44,6 +44,8 @@ pub enum EventKind {
     MessageLost = 12,
     /// An axis of the force sensor is saturated; `a` = error word.
     ForceSaturated = 13,
+    /// The record cannot be written any more; what follows is not recorded.
+    RecordLost = 14,
 }
 
 impl EventKind {
@@ -63,6 +65,7 @@ impl EventKind {
             EventKind::BusError => "bus-error",
             EventKind::MessageLost => "message-lost",
             EventKind::ForceSaturated => "force-saturated",
+            EventKind::RecordLost => "record-lost",
         }
     }
 
@@ -83,6 +86,7 @@ impl EventKind {
             BusError,
             MessageLost,
             ForceSaturated,
+            RecordLost,
         ]
         .into_iter()
         .find(|kind| *kind as u32 == number)

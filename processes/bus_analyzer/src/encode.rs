@@ -182,5 +182,6 @@ const fn figures(kind: EventKind) -> [&'static str; 2] {
         BusError => ["job", "address"],
         MessageLost => ["sequence", ""],
         ForceSaturated => ["errors", ""],
+        RecordLost => ["", ""],
     }
 }

@@ -3,7 +3,7 @@
 pub mod arm;
 pub mod bus;
 pub mod design;
-//pub mod log;
+pub mod log;
 pub mod run;
 pub mod scenario;
 pub mod scenarios;

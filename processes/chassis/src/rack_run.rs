@@ -1,60 +1,86 @@
-//! One variant of a scenario, from power-up to the last window.
+//! One variant of a scenario, from power-up to the last window, and what it comes to.
 
 use crate::boards;
 use board::{Mail, Ns};
-use messages::drive_status;
+use messages::{EventKind, drive_status};
 use pacing::{Context, Flow, Lockstep, Observer, RunError};
-use scenario::{Process, Scenario};
+use report::{Ended, Ledger, Trace, VariantResult};
+use scenario::{Process, Scenario, Variant};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 use vme::Transfer;
 
-/// Set by Ctrl-C.
-pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// Set by Ctrl-C; every run of this process ends soon after.
+pub static INTERRUPTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// What a run needs to know beside its scenario.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Setting {
-    /// Name of the variant.
-    pub variant: String,
     /// Every board in the chassis.
     pub in_process: bool,
     /// Record to write; none = recording off.
     pub record: Option<PathBuf>,
 }
 
-/// How a run came to its end.
-#[derive(Clone, Debug, PartialEq)]
+/// What a run came to.
 pub struct Finished {
-    /// Simulated time reached, ns.
-    pub reached: Ns,
-    /// The simulation left its domain there.
-    pub diverged: bool,
+    /// Measures, tables, curves.
+    pub result: VariantResult,
+    /// Why it ended before its time, where it did.
+    pub error: Option<RunError>,
+    /// The record is incomplete: it could not be written to its end.
+    pub record_lost: bool,
     /// Wall time from the start to the first window.
     pub start_up: Duration,
     /// Wall time of the windows.
     pub windows: Duration,
 }
 
-/// Runs the scenario; `watcher` sees every window.
-pub fn run(scenario: &Scenario, setting: &Setting, watcher: &mut dyn Observer) -> Result<Finished, RunError> {
+/// Runs one variant's scenario to its end, or as far as it goes. `progress` hears the simulated time.
+/// The error says what of the scenario cannot be measured.
+pub fn run(
+    scenario: &Scenario,
+    variant: &Variant,
+    setting: &Setting,
+    progress: &mut dyn FnMut(Ns),
+) -> Result<Finished, String> {
     let start = Instant::now();
+    let mut witness = Witness {
+        trace: Trace::with_capacity((scenario.duration() * 250.0) as usize),
+        ledger: Ledger::new(scenario),
+        reached: 0,
+        diverged: false,
+        record_lost: false,
+        start_up: Duration::ZERO,
+        start,
+        progress,
+    };
+    let error = carry_out(scenario, variant, setting, &mut witness).err();
+    let windows = start.elapsed().saturating_sub(witness.start_up);
+    let at_s = witness.reached as f64 * 1e-9;
+    let ended = match &error {
+        Some(error) => Ended::Stopped { at_s, reason: error.to_string() },
+        None if witness.diverged => Ended::Diverged { at_s },
+        None => Ended::Completed,
+    };
+    let mut result = VariantResult::new(scenario, variant, &witness.trace, &witness.ledger, ended, at_s)?;
+    result.wall_s = Some(windows.as_secs_f64());
+    Ok(Finished { result, error, record_lost: witness.record_lost, start_up: witness.start_up, windows })
+}
+
+fn carry_out(scenario: &Scenario, variant: &Variant, setting: &Setting, witness: &mut Witness<'_>) -> Result<(), RunError> {
     let mut scenario = scenario.clone();
     if setting.in_process {
         scenario.processes = vec![everything_in_the_chassis()];
     }
     let end = scenario.duration_ns();
-    let context = Context { prefix: String::new(), variant: setting.variant.clone(), record: setting.record.clone(), scenario };
+    let context = Context { prefix: String::new(), variant: variant.name.clone(), record: setting.record.clone(), scenario };
     let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
-    let start_up = start.elapsed();
-    let mut guard = DivergenceGuard { watcher, diverged: false };
-    rack.run(end, &mut guard)?;
-    let diverged = guard.diverged;
-    let reached = rack.now();
-    let windows = start.elapsed() - start_up;
-    rack.finish()?;
-    Ok(Finished { reached, diverged, start_up, windows })
+    witness.start_up = witness.start.elapsed();
+    rack.run(end, witness)?;
+    rack.finish()
 }
 
 /// The process list of a run inside this process.
@@ -63,18 +89,26 @@ pub fn everything_in_the_chassis() -> Process {
     Process { name: messages::BOARDS[0].name().to_owned(), boards, command: Vec::new() }
 }
 
-/// Ends a run whose plant has left its domain.
-struct DivergenceGuard<'a> {
-    watcher: &'a mut dyn Observer,
+/// Collects what a run is measured by, and ends it when the plant has left its domain.
+struct Witness<'a> {
+    trace: Trace,
+    ledger: Ledger,
+    reached: Ns,
     diverged: bool,
+    record_lost: bool,
+    start_up: Duration,
+    start: Instant,
+    progress: &'a mut dyn FnMut(Ns),
 }
 
-impl Observer for DivergenceGuard<'_> {
+impl Observer for Witness<'_> {
     fn window(&mut self, until: Ns, mail: &Mail, transfers: &[Transfer]) -> Flow {
+        self.reached = until;
+        self.trace.window(&mail.plant_probe, &mail.control_probe, &mail.events);
+        transfers.iter().for_each(|transfer| self.ledger.push(transfer));
+        self.record_lost |= mail.events.iter().any(|event| event.kind == EventKind::RecordLost as u32);
         self.diverged |= mail.plant_probe.iter().any(|probe| probe.status & drive_status::DIVERGED != 0);
-        match self.watcher.window(until, mail, transfers) {
-            Flow::Continue if self.diverged => Flow::Stop,
-            flow => flow,
-        }
+        (self.progress)(until);
+        if self.diverged { Flow::Stop } else { Flow::Continue }
     }
 }

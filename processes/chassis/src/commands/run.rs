@@ -1,59 +1,249 @@
-//! `vmerack run`: runs every variant of a scenario.
+//! `vmerack run`: runs every variant of a scenario, prints the tables, writes records and report.
+//!
+//! Exit code 0 where every limit holds, 1 where a run could not be carried out, 3 where a record is incomplete, 4 where a
+//! limit is violated.
 
-use crate::rack_run::{self, Setting};
-use board::Mail;
-use clap::Args;
-use pacing::{Flow, Observer};
-use vme::{Ns, Transfer};
+use crate::rack_run::{self, Finished, INTERRUPTED, Setting};
+use clap::{Args, ValueEnum};
+use crossbeam::channel;
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{IntoDiagnostic, WrapErr, miette};
+use report::{RunReport, Sweep, SweepPoint, VariantResult, Verdict};
+use scenario::{Document, Scenario, Variant};
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Run every variant of a scenario.
 #[derive(Debug, Args)]
 pub struct RunArgs {
     /// A built-in scenario or a file.
     scenario: String,
-    #[arg(long)]
+    /// Simulated time in lock step (reproducible to the bit), or wall clock.
+    #[arg(long, value_enum, default_value_t = Pacing::Lockstep)]
+    pacing: Pacing,
+    /// Run every board in this process.
+    #[arg(long, conflicts_with = "pacing")]
     in_process: bool,
-    #[arg(long)]
+    /// Folder for report.json, report.html and one record per variant [default: a new folder in runs/].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Seed of every random stream.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Simulated length, in place of the scenario's.
+    #[arg(long, value_name = "SECONDS")]
+    duration: Option<f64>,
+    /// Run this variant only; may be repeated.
+    #[arg(long, value_name = "NAME")]
     variant: Vec<String>,
     /// Override a key of the scenario; may be repeated.
     #[arg(long, value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
+    /// Write no record.
+    #[arg(long)]
+    no_record: bool,
+    /// Print report.json to standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
 }
 
-struct Print {
-    next: Ns,
-}
-
-impl Observer for Print {
-    fn window(&mut self, until: Ns, mail: &Mail, transfers: &[Transfer]) -> Flow {
-        for e in &mail.events {
-            eprintln!("{:?} {:?}", messages::EventKind::from_number(e.kind), e);
-        }
-        if let (Some(p), Some(c)) = (mail.plant_probe.last(), mail.control_probe.last()) {
-            if until >= self.next {
-                self.next += 250 * vme::MILLISECOND;
-                eprintln!("{:.3} fz {:.3} fe {:.3} z {:.5} xt {:.5} x {:.5} tau {:?} lim {} tr {} st {:x} e_age {}", until as f64 * 1e-9, p.contact[2], c.fe[2], p.position[2], c.xt[2], c.x[2], c.torque.map(|t| t.round()), c.limits, transfers.len(), p.status, c.encoder_age);
-            }
-        }
-        Flow::Continue
-    }
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Pacing {
+    Lockstep,
+    Realtime,
 }
 
 /// Runs the command and returns its exit code.
 pub fn run(args: RunArgs) -> miette::Result<u8> {
-    let document = scenario::load(&args.scenario, &args.set)?;
-    for (variant, scenario) in document.variants()? {
-        if !args.variant.is_empty() && !args.variant.contains(&variant.name) {
-            continue;
-        }
-        let setting = Setting { variant: variant.name.clone(), in_process: args.in_process, record: None };
-        match rack_run::run(&scenario, &setting, &mut Print { next: 0 }) {
-            Ok(f) => eprintln!("{} {f:?} x{:.1}", variant.name, f.reached as f64 / f.windows.as_nanos() as f64),
-            Err(e) => {
-                eprintln!("{e}");
-                return Ok(1);
-            }
+    let mut overrides = args.set.clone();
+    overrides.extend(args.seed.map(|seed| format!("seed={seed}")));
+    overrides.extend(args.duration.map(|seconds| format!("duration_s={seconds:?}")));
+    let document = scenario::load(&args.scenario, &overrides)?;
+    let variants = chosen(&document, &args.variant)?;
+    let folder = out_folder(args.out.as_deref(), &document.name)?;
+    end_on_signals()?;
+    for (variant, scenario) in &variants {
+        for warning in scenario::warnings(scenario) {
+            eprintln!("warning: variant {}: {warning}", variant.name);
         }
     }
-    Ok(0)
+
+    let mut results = Vec::new();
+    let (mut failed, mut losses) = (false, false);
+    for (variant, scenario) in &variants {
+        let record = (!args.no_record).then(|| folder.join(format!("{}.mcap", variant.name)));
+        let setting = Setting { in_process: args.in_process, record: record.clone() };
+        let finished = run_with_progress(scenario, variant, &setting)?;
+        let mut result = finished.result;
+        if let Some(error) = &finished.error {
+            eprintln!("error: variant {}: {error}", variant.name);
+            failed = true;
+        }
+        losses |= finished.record_lost;
+        if let Some(record) = &record {
+            match settle_record(record, finished.error.is_some()) {
+                Ok(digest) => result.digest = Some(digest),
+                Err(reason) => {
+                    eprintln!("error: {}: {reason}", record.display());
+                    losses = true;
+                }
+            }
+            result.record = record.file_name().map(|name| name.to_string_lossy().into_owned());
+        }
+        results.push(result);
+        if failed {
+            break;
+        }
+    }
+    let sweeps = if failed { Vec::new() } else { sweeps(&document, &variants)? };
+
+    let pacing = match (args.pacing, args.in_process) {
+        (Pacing::Realtime, _) => "real time across processes",
+        (Pacing::Lockstep, false) => "lock step across processes",
+        (Pacing::Lockstep, true) => "lock step in one process",
+    };
+    let base = document.scenario()?;
+    let report = RunReport::new(&document.name, &base, pacing, results, sweeps);
+    report.write(&folder).map_err(|error| miette!("{error}"))?;
+    if args.json {
+        println!("{}", report.json().into_diagnostic()?);
+    } else {
+        print!("{}", report::text::render(&report));
+        println!("\nrecord and report: {}", folder.display());
+    }
+    Ok(match (failed, losses, report.verdict) {
+        (true, ..) => 1,
+        (false, true, _) => 3,
+        (false, false, Verdict::Failed) => 4,
+        (false, false, Verdict::Passed) => 0,
+    })
+}
+
+fn chosen(document: &Document, names: &[String]) -> miette::Result<Vec<(Variant, Scenario)>> {
+    let mut variants = document.variants()?;
+    if let Some(unknown) = names.iter().find(|name| !variants.iter().any(|(variant, _)| variant.name == **name)) {
+        let known: Vec<&str> = variants.iter().map(|(variant, _)| variant.name.as_str()).collect();
+        return Err(scenario::ScenarioError::Override {
+            origin: "--variant".into(),
+            key: unknown.clone(),
+            message: format!("there is no such variant, expected one of {}", known.join(", ")),
+        }
+        .into());
+    }
+    variants.retain(|(variant, _)| names.is_empty() || names.contains(&variant.name));
+    Ok(variants)
+}
+
+/// The folder asked for, or the first free `runs/NAME-NNN`.
+fn out_folder(asked: Option<&Path>, name: &str) -> miette::Result<PathBuf> {
+    let make = |folder: &Path| {
+        std::fs::create_dir_all(folder).into_diagnostic().wrap_err_with(|| format!("cannot make the folder {}", folder.display()))
+    };
+    if let Some(folder) = asked {
+        make(folder)?;
+        return std::path::absolute(folder).into_diagnostic();
+    }
+    make(Path::new("runs"))?;
+    for number in 1.. {
+        let folder = Path::new("runs").join(format!("{name}-{number:03}"));
+        match std::fs::create_dir(&folder) {
+            Ok(()) => return std::path::absolute(folder).into_diagnostic(),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error).into_diagnostic().wrap_err_with(|| format!("cannot make the folder {}", folder.display())),
+        }
+    }
+    Err(miette!("no free folder in runs/"))
+}
+
+/// The first Ctrl-C or SIGTERM ends the run in order, the second one at once.
+fn end_on_signals() -> miette::Result<()> {
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, 1, Arc::clone(&INTERRUPTED)).into_diagnostic()?;
+        signal_hook::flag::register(signal, Arc::clone(&INTERRUPTED)).into_diagnostic()?;
+    }
+    Ok(())
+}
+
+fn run_with_progress(scenario: &Scenario, variant: &Variant, setting: &Setting) -> miette::Result<Finished> {
+    let end = scenario.duration_ns();
+    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(end) } else { ProgressBar::hidden() };
+    if let Ok(style) = ProgressStyle::with_template("{prefix:24} {bar:40} {percent:>3} %  {elapsed} + {eta}") {
+        bar.set_style(style);
+    }
+    bar.set_prefix(variant.name.clone());
+    // a bar needs no more than a few dozen updates
+    let mut next = 0;
+    let finished = rack_run::run(scenario, variant, setting, &mut |until| {
+        if until >= next {
+            bar.set_position(until);
+            next = until + end / 50;
+        }
+    });
+    bar.finish_and_clear();
+    finished.map_err(|reason| miette!("variant {}: {reason}", variant.name))
+}
+
+/// The record's digest; a record that a broken run left cut is made whole first.
+fn settle_record(record: &Path, broken: bool) -> Result<String, String> {
+    if broken && bus_analyzer::digest_file(record).is_err() {
+        let whole = record.with_extension("mcap.part");
+        let recovered = bus_analyzer::recover(record, &whole).map_err(|error| error.to_string())?;
+        std::fs::rename(&whole, record).map_err(|error| error.to_string())?;
+        eprintln!("record made whole: {recovered}");
+    }
+    bus_analyzer::digest_file(record).map_err(|error| error.to_string())
+}
+
+/// The report's sweeps, in this process, on every core.
+fn sweeps(document: &Document, variants: &[(Variant, Scenario)]) -> miette::Result<Vec<Sweep>> {
+    let mut sweeps = Vec::new();
+    for sweep in &document.scenario()?.report.sweeps {
+        let mut jobs = Vec::new();
+        for value in &sweep.values {
+            let varied = document.with(&sweep.key, toml::Value::Float(*value))?;
+            for (variant, scenario) in varied.variants()? {
+                if sweep.variants.contains(&variant.name) && variants.iter().any(|(run, _)| run.name == variant.name) {
+                    jobs.push((*value, variant, scenario));
+                }
+            }
+        }
+        let mut points = parallel(&jobs, |(value, variant, scenario)| {
+            let setting = Setting { in_process: true, record: None };
+            rack_run::run(scenario, variant, &setting, &mut |_| {}).map(|finished| point(*value, &finished.result))
+        });
+        let points = points.drain(..).collect::<Result<Vec<_>, String>>().map_err(|reason| miette!("sweep {}: {reason}", sweep.key))?;
+        sweeps.push(Sweep { key: sweep.key.clone(), points });
+    }
+    Ok(sweeps)
+}
+
+fn point(value: f64, result: &VariantResult) -> SweepPoint {
+    SweepPoint::new(value, result)
+}
+
+/// Does every job on all cores; the answers keep the jobs' order.
+fn parallel<J: Sync, A: Send>(jobs: &[J], work: impl Fn(&J) -> A + Sync) -> Vec<A> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let (give, take) = channel::unbounded();
+    let (answer, answers) = channel::unbounded();
+    for job in jobs.iter().enumerate() {
+        // the receiver lives until the end of this function
+        let _ = give.send(job);
+    }
+    drop(give);
+    std::thread::scope(|scope| {
+        for _ in 0..cores.min(jobs.len()) {
+            let (take, answer, work) = (take.clone(), answer.clone(), &work);
+            scope.spawn(move || {
+                for (i, job) in take {
+                    let _ = answer.send((i, work(job)));
+                }
+            });
+        }
+    });
+    drop(answer);
+    let mut answers: Vec<(usize, A)> = answers.into_iter().collect();
+    answers.sort_by_key(|(i, _)| *i);
+    answers.into_iter().map(|(_, answer)| answer).collect()
 }

@@ -11,9 +11,7 @@ use crate::plant::{Actuation, Evaluation, Plant};
 use crate::state::State;
 use arm::{DOF, JointVector, Pose, rotation};
 use board::{Board, Inputs, Outputs};
-use messages::{
-    AmplifierCommand, Event, EventKind, Ns, PlantProbe, PlantSample, Severity, drive_status,
-};
+use messages::{AmplifierCommand, Event, EventKind, Ns, PlantProbe, PlantSample, Severity, drive_status};
 use nalgebra::Vector3;
 use scenario::{Integrator, Scenario};
 
@@ -73,9 +71,7 @@ impl HwSim {
 
     /// Forces in the committed state.
     fn now(&mut self) -> Evaluation {
-        *self
-            .now
-            .get_or_insert_with(|| self.plant.evaluate(&self.state, &self.actuation))
+        *self.now.get_or_insert_with(|| self.plant.evaluate(&self.state, &self.actuation))
     }
 
     /// Limit switches, emergency chain and brake contacts in the committed state. The switches sit in the chain.
@@ -92,11 +88,7 @@ impl HwSim {
 
     /// Applies the commands whose time has come.
     fn actuate(&mut self) {
-        let due = self
-            .pending
-            .iter()
-            .take_while(|command| command.t <= self.t)
-            .count();
+        let due = self.pending.iter().take_while(|command| command.t <= self.t).count();
         if let Some(last) = self.pending[..due].last() {
             let before = self.actuation;
             self.actuation = Actuation::from_command(last);
@@ -118,27 +110,14 @@ impl HwSim {
     fn commit(&mut self, t: Ns, out: &mut Outputs) -> bool {
         let now = self.now();
         let before = self.state;
-        integrate::step(
-            &self.plant,
-            self.integrator,
-            &mut self.state,
-            &now,
-            &self.actuation,
-            seconds(t - self.t),
-        );
+        integrate::step(&self.plant, self.integrator, &mut self.state, &now, &self.actuation, seconds(t - self.t));
         self.t = t;
         self.now = None;
         if let Some((joint, value)) = self.state.out_of_domain(self.runaway) {
             self.state = before;
             self.status |= drive_status::DIVERGED;
             let value = if value.is_finite() { value } else { f64::MAX };
-            out.mail.events.push(Event::new(
-                t,
-                EventKind::Diverged,
-                Severity::Error,
-                joint as f64,
-                value,
-            ));
+            out.mail.events.push(Event::new(t, EventKind::Diverged, Severity::Error, joint as f64, value));
             return false;
         }
         self.status = self.switches();
@@ -163,8 +142,7 @@ impl HwSim {
     }
 
     fn sample_of(&self, t: Ns, state: &State, now: &Evaluation) -> PlantSample {
-        let shaft =
-            |v: &JointVector| std::array::from_fn(|i| v[i] * self.plant.drives[i].gear_ratio);
+        let shaft = |v: &JointVector| std::array::from_fn(|i| v[i] * self.plant.drives[i].gear_ratio);
         PlantSample {
             t,
             wrench: self.plant.sensor.wrench(now),
@@ -210,14 +188,7 @@ impl HwSim {
         let mut now = self.now();
         if self.t < until {
             let h = seconds(until - self.t);
-            integrate::step(
-                &self.plant,
-                self.integrator,
-                &mut state,
-                &now,
-                &self.actuation,
-                h,
-            );
+            integrate::step(&self.plant, self.integrator, &mut state, &now, &self.actuation, h);
             now = self.plant.evaluate(&state, &self.actuation);
             if state.out_of_domain(self.runaway).is_some() {
                 // the next step of the grid will find it too and say so
@@ -260,11 +231,7 @@ impl Board for HwSim {
             self.finish_window(inputs.until, out);
             return;
         }
-        out.mail.plant.push(PlantSample {
-            t: inputs.from,
-            status: self.status,
-            ..self.last_sample
-        });
+        out.mail.plant.push(PlantSample { t: inputs.from, status: self.status, ..self.last_sample });
         if self.status & drive_status::DIVERGED != 0 {
             return self.freeze(inputs.until, out);
         }
@@ -280,10 +247,7 @@ impl Board for HwSim {
             if !self.commit(next, out) {
                 return self.freeze(inputs.until, out);
             }
-            let closed = self.status
-                & !switches
-                & (drive_status::LIMIT_SWITCH | drive_status::AMPLIFIER_TRIPPED)
-                != 0;
+            let closed = self.status & !switches & (drive_status::LIMIT_SWITCH | drive_status::AMPLIFIER_TRIPPED) != 0;
             if next == grid || closed {
                 self.sample(out);
             }

@@ -81,13 +81,7 @@ impl Contact {
     }
 
     /// Adds this contact to `touch`, for the tool at `pose` with `twist` (base axes) and the points' bristles.
-    pub fn add_to(
-        &self,
-        touch: &mut Touch,
-        pose: &Pose,
-        twist: &Spatial,
-        bristles: &[Vector3<f64>],
-    ) {
+    pub fn add_to(&self, touch: &mut Touch, pose: &Pose, twist: &Spatial, bristles: &[Vector3<f64>]) {
         match self {
             Contact::Plane(plane) => plane.add_to(touch, pose, twist, &bristles[0]),
             Contact::Peg(peg) => peg.add_to(touch, pose, twist, bristles),
@@ -95,14 +89,7 @@ impl Contact {
     }
 
     /// Moves the bristles on by `h` seconds in which the tool, at `pose` with `twist` now, has the twist `moving`.
-    pub fn advance(
-        &self,
-        bristles: &mut [Vector3<f64>],
-        pose: &Pose,
-        twist: &Spatial,
-        moving: &Spatial,
-        h: f64,
-    ) {
+    pub fn advance(&self, bristles: &mut [Vector3<f64>], pose: &Pose, twist: &Spatial, moving: &Spatial, h: f64) {
         match self {
             Contact::Plane(plane) => plane.advance(&mut bristles[0], pose, twist, moving, h),
             Contact::Peg(peg) => peg.advance(bristles, pose, twist, moving, h),
@@ -145,16 +132,8 @@ impl Material {
 
     /// Friction that the tool exerts, for a deflection within [`Material::held`] and the tangential velocity.
     #[inline]
-    pub fn friction_force(
-        &self,
-        held: Vector3<f64>,
-        velocity: Vector3<f64>,
-        normal: f64,
-    ) -> Vector3<f64> {
-        cut(
-            held * self.stiffness + velocity * (self.stiffness * TANGENTIAL_RELAXATION),
-            self.friction * normal,
-        )
+    pub fn friction_force(&self, held: Vector3<f64>, velocity: Vector3<f64>, normal: f64) -> Vector3<f64> {
+        cut(held * self.stiffness + velocity * (self.stiffness * TANGENTIAL_RELAXATION), self.friction * normal)
     }
 }
 
@@ -162,9 +141,5 @@ impl Material {
 #[inline]
 fn cut(v: Vector3<f64>, length: f64) -> Vector3<f64> {
     let square = v.norm_squared();
-    if square <= length * length * (1.0 + 1e-12) {
-        v
-    } else {
-        v * (length / square.sqrt())
-    }
+    if square <= length * length * (1.0 + 1e-12) { v } else { v * (length / square.sqrt()) }
 }

@@ -16,9 +16,7 @@ pub fn mechanical(plant: &Plant, state: &State) -> f64 {
         let drive = &plant.drives[i];
         energy += 0.5 * drive.rotor * state.theta_dot[i] * state.theta_dot[i];
         if plant.joints == Joints::Flexible {
-            let deflection = drive
-                .transmission(state.theta[i], 0.0, state.q[i], 0.0)
-                .deflection;
+            let deflection = drive.transmission(state.theta[i], 0.0, state.q[i], 0.0).deflection;
             energy += 0.5 * drive.stiffness * deflection * deflection;
         }
     }
@@ -57,12 +55,7 @@ mod tests {
                 gravity_potential(&arm, &q)
             };
             let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
-            assert!(
-                (slope - torque[i]).abs() < 1e-6,
-                "joint {}: {slope} {}",
-                i + 1,
-                torque[i]
-            );
+            assert!((slope - torque[i]).abs() < 1e-6, "joint {}: {slope} {}", i + 1, torque[i]);
         }
     }
 }

@@ -22,10 +22,7 @@ pub struct Bristle {
 impl Bristle {
     /// A bristle on which `inertia` rings with `STICKING_DAMPING_RATIO`.
     pub fn holding(stiffness: f64, inertia: f64) -> Bristle {
-        Bristle {
-            stiffness,
-            damping: 2.0 * STICKING_DAMPING_RATIO * (stiffness * inertia).sqrt(),
-        }
+        Bristle { stiffness, damping: 2.0 * STICKING_DAMPING_RATIO * (stiffness * inertia).sqrt() }
     }
 
     /// The deflection that remains of `deflection` when the bristle carries at most `capacity`.
@@ -71,10 +68,7 @@ impl JointFriction {
             viscous: scale * drive.viscous_nms_per_rad,
             stribeck_rise: drive.breakaway_ratio - 1.0,
             stribeck_speed: drive.stribeck_speed_rad_per_s,
-            bristle: Bristle::holding(
-                scale * nominal / drive.presliding_rad,
-                drive.rotor_inertia_at_output_kg_m2,
-            ),
+            bristle: Bristle::holding(scale * nominal / drive.presliding_rad, drive.rotor_inertia_at_output_kg_m2),
         }
     }
 
@@ -89,11 +83,7 @@ impl JointFriction {
         let coulomb = self.coulomb + self.load_part * load.abs();
         let s = v / self.stribeck_speed;
         // beyond six Stribeck speeds the rise is below the last bit
-        let rise = if s.abs() < 6.1 {
-            self.stribeck_rise * libm::exp(-s * s)
-        } else {
-            0.0
-        };
+        let rise = if s.abs() < 6.1 { self.stribeck_rise * libm::exp(-s * s) } else { 0.0 };
         coulomb * (1.0 + rise)
     }
 
@@ -102,10 +92,7 @@ impl JointFriction {
     pub fn torque(&self, deflection: f64, v: f64, load: f64) -> (f64, f64) {
         let capacity = self.capacity(v, load);
         let held = self.bristle.held(deflection, capacity);
-        (
-            self.bristle.force(held, v, capacity) + self.viscous * v,
-            held,
-        )
+        (self.bristle.force(held, v, capacity) + self.viscous * v, held)
     }
 }
 
@@ -119,12 +106,7 @@ mod tests {
     }
 
     /// A rotor alone with its friction, for `seconds` at 10 kHz; its travel and final speed.
-    fn travel(
-        friction: &JointFriction,
-        inertia: f64,
-        seconds: f64,
-        torque: impl Fn(f64) -> f64,
-    ) -> (f64, f64) {
+    fn travel(friction: &JointFriction, inertia: f64, seconds: f64, torque: impl Fn(f64) -> f64) -> (f64, f64) {
         let (mut x, mut v, mut z, h) = (0.0, 0.0, 0.0, 1e-4);
         for n in 0..(seconds / h) as u64 {
             let (f, held) = friction.torque(z, v, 0.0);
@@ -142,10 +124,8 @@ mod tests {
         let breakaway = drive.breakaway_at_load_nm(0.0);
         for sign in [1.0, -1.0] {
             for ripple in [0.0, 0.3] {
-                let torque = |t: f64| {
-                    sign * breakaway
-                        * (0.65 + ripple * libm::sin(2.0 * std::f64::consts::PI * 50.0 * t))
-                };
+                let torque =
+                    |t: f64| sign * breakaway * (0.65 + ripple * libm::sin(2.0 * std::f64::consts::PI * 50.0 * t));
                 let (x_1, _) = travel(&friction, 4.0, 1.0, torque);
                 let (x_60, v_60) = travel(&friction, 4.0, 60.0, torque);
                 assert!((x_60 - x_1).abs() < 1e-7, "creep {} rad", x_60 - x_1);
@@ -159,15 +139,9 @@ mod tests {
         let drive = joint_2();
         let friction = JointFriction::new(&drive, 1.0);
         for sign in [1.0, -1.0] {
-            let (_, v) = travel(&friction, 4.0, 5.0, |_| {
-                sign * 1.05 * drive.breakaway_at_load_nm(0.0)
-            });
-            let expected = (1.05 * drive.breakaway_at_load_nm(0.0) - drive.coulomb_nm)
-                / drive.viscous_nms_per_rad;
-            assert!(
-                (v - sign * expected).abs() < 1e-3 * expected,
-                "{v} {expected}"
-            );
+            let (_, v) = travel(&friction, 4.0, 5.0, |_| sign * 1.05 * drive.breakaway_at_load_nm(0.0));
+            let expected = (1.05 * drive.breakaway_at_load_nm(0.0) - drive.coulomb_nm) / drive.viscous_nms_per_rad;
+            assert!((v - sign * expected).abs() < 1e-3 * expected, "{v} {expected}");
         }
     }
 
@@ -176,18 +150,10 @@ mod tests {
         let drive = joint_2();
         for scale in [0.0, 1.0, 2.0] {
             let friction = JointFriction::new(&drive, scale);
+            assert!((friction.capacity(0.0, -78.0) - scale * drive.breakaway_at_load_nm(78.0)).abs() < 1e-12);
+            assert!((friction.capacity(1.0, 78.0) - scale * drive.coulomb_at_load_nm(78.0)).abs() < 1e-12);
             assert!(
-                (friction.capacity(0.0, -78.0) - scale * drive.breakaway_at_load_nm(78.0)).abs()
-                    < 1e-12
-            );
-            assert!(
-                (friction.capacity(1.0, 78.0) - scale * drive.coulomb_at_load_nm(78.0)).abs()
-                    < 1e-12
-            );
-            assert!(
-                (friction.torque(0.0, 1.0, 0.0).0
-                    - scale * (drive.coulomb_nm + drive.viscous_nms_per_rad))
-                    .abs()
+                (friction.torque(0.0, 1.0, 0.0).0 - scale * (drive.coulomb_nm + drive.viscous_nms_per_rad)).abs()
                     < 1e-12
             );
         }

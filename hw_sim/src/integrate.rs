@@ -9,14 +9,7 @@ use arm::{DOF, JointVector, Spatial};
 use scenario::Integrator;
 
 /// Carries `state`, in which `now` was evaluated, on by `h` seconds.
-pub fn step(
-    plant: &Plant,
-    integrator: Integrator,
-    state: &mut State,
-    now: &Evaluation,
-    actuation: &Actuation,
-    h: f64,
-) {
+pub fn step(plant: &Plant, integrator: Integrator, state: &mut State, now: &Evaluation, actuation: &Actuation, h: f64) {
     match integrator {
         Integrator::SemiImplicit => semi_implicit(plant, state, now, h),
         Integrator::Rk4 => rk4(plant, state, now, actuation, h),
@@ -60,15 +53,7 @@ fn rk4(plant: &Plant, state: &mut State, k1: &Evaluation, actuation: &Actuation,
     // speeds and accelerations of the stage before lead to the next stage
     let stage = |speeds: &State, k: &Evaluation, h: f64| {
         let mut next = start;
-        drift(
-            plant,
-            &mut next,
-            k1,
-            &speeds.qd,
-            &speeds.theta_dot,
-            &k.twist,
-            h,
-        );
+        drift(plant, &mut next, k1, &speeds.qd, &speeds.theta_dot, &k.twist, h);
         next.load = start.load;
         next.qd = start.qd + k.qdd * h;
         next.theta_dot = start.theta_dot + k.theta_ddot * h;
@@ -87,6 +72,5 @@ fn rk4(plant: &Plant, state: &mut State, k1: &Evaluation, actuation: &Actuation,
     let twist = (k1.twist + (k2.twist + k3.twist) * 2.0 + k4.twist) * sixth;
     drift(plant, state, k1, &qd, &theta_dot, &twist, h);
     state.qd += (k1.qdd + (k2.qdd + k3.qdd) * 2.0 + k4.qdd) * (sixth * h);
-    state.theta_dot +=
-        (k1.theta_ddot + (k2.theta_ddot + k3.theta_ddot) * 2.0 + k4.theta_ddot) * (sixth * h);
+    state.theta_dot += (k1.theta_ddot + (k2.theta_ddot + k3.theta_ddot) * 2.0 + k4.theta_ddot) * (sixth * h);
 }

@@ -44,10 +44,7 @@ pub struct Actuation {
 
 impl Actuation {
     /// Torque off, brakes engaged.
-    pub const SAFE: Actuation = Actuation {
-        volts: [0.0; DOF],
-        braked: 0x7F,
-    };
+    pub const SAFE: Actuation = Actuation { volts: [0.0; DOF], braked: 0x7F };
 
     /// What a command of the D/A and parallel I/O cards means.
     pub fn from_command(command: &AmplifierCommand) -> Actuation {
@@ -94,25 +91,15 @@ impl Plant {
             Joints::Flexible => rotors,
             Joints::Rigid => rotors + felt_inertia(&arm, &q)?,
         };
-        let contacts: Vec<Contact> = scenario
-            .surfaces
-            .iter()
-            .map(|surface| Contact::Plane(Plane::from_surface(scenario, surface)))
-            .collect();
+        let contacts: Vec<Contact> =
+            scenario.surfaces.iter().map(|surface| Contact::Plane(Plane::from_surface(scenario, surface))).collect();
         let points: usize = contacts.iter().map(Contact::points).sum();
         if points > CONTACT_POINTS {
-            return Err(format!(
-                "the surfaces have {points} contact points, expected at most {CONTACT_POINTS}"
-            ));
+            return Err(format!("the surfaces have {points} contact points, expected at most {CONTACT_POINTS}"));
         }
         let mut plant = Plant {
             drives: std::array::from_fn(|i| {
-                Drive::new(
-                    &data.joints[i],
-                    plant.friction_scale,
-                    plant.kinematic_error,
-                    braked[i],
-                )
+                Drive::new(&data.joints[i], plant.friction_scale, plant.kinematic_error, braked[i])
             }),
             joints: plant.joints,
             contacts,
@@ -153,9 +140,7 @@ impl Plant {
             return f64::NAN;
         };
         let jacobian = arm::jacobian(&self.arm, q);
-        (0..3)
-            .map(|k| (jacobian.row(k) * inverse * jacobian.row(k).transpose())[0])
-            .sum()
+        (0..3).map(|k| (jacobian.row(k) * inverse * jacobian.row(k).transpose())[0]).sum()
     }
 
     /// Upper bound of the natural frequencies at a posture, rad/s: everything sticks and the tool is in contact. The sum of
@@ -166,28 +151,14 @@ impl Plant {
         };
         let flexible = self.joints == Joints::Flexible;
         let on_link = |drive: &Drive| {
-            if flexible {
-                drive.stiffness
-            } else {
-                drive.holding_stiffness()
-            }
+            if flexible { drive.stiffness } else { drive.holding_stiffness() }
         };
         let on_rotor = |drive: &Drive| {
-            if flexible {
-                (drive.stiffness + drive.holding_stiffness()) / drive.rotor
-            } else {
-                0.0
-            }
+            if flexible { (drive.stiffness + drive.holding_stiffness()) / drive.rotor } else { 0.0 }
         };
-        let links: f64 = (0..DOF)
-            .map(|i| on_link(&self.drives[i]) * inverse[(i, i)])
-            .sum();
+        let links: f64 = (0..DOF).map(|i| on_link(&self.drives[i]) * inverse[(i, i)]).sum();
         let rotors = self.drives.iter().map(on_rotor).fold(0.0, f64::max);
-        let surface = self
-            .contacts
-            .iter()
-            .map(|contact| contact.material().stiffness)
-            .fold(0.0, f64::max);
+        let surface = self.contacts.iter().map(|contact| contact.material().stiffness).fold(0.0, f64::max);
         (links + rotors + tool_mobility * surface).sqrt()
     }
 
@@ -223,23 +194,10 @@ impl Plant {
         let qdd = match self.joints {
             Joints::Flexible => {
                 for (i, drive) in self.drives.iter().enumerate() {
-                    let Transmission {
-                        on_link, on_rotor, ..
-                    } = drive.transmission(
-                        state.theta[i],
-                        state.theta_dot[i],
-                        state.q[i],
-                        state.qd[i],
-                    );
-                    loss[i] = drive.loss(
-                        state.presliding[i],
-                        state.brake[i],
-                        state.theta_dot[i],
-                        on_link,
-                        braked(i),
-                    );
-                    theta_ddot[i] =
-                        (motor[i] - loss[i].friction - loss[i].brake - on_rotor) / drive.rotor;
+                    let Transmission { on_link, on_rotor, .. } =
+                        drive.transmission(state.theta[i], state.theta_dot[i], state.q[i], state.qd[i]);
+                    loss[i] = drive.loss(state.presliding[i], state.brake[i], state.theta_dot[i], on_link, braked(i));
+                    theta_ddot[i] = (motor[i] - loss[i].friction - loss[i].brake - on_rotor) / drive.rotor;
                     transmitted[i] = on_link;
                 }
                 arm.aba(&transmitted, &JointVector::zeros(), &f_tip)
@@ -248,13 +206,7 @@ impl Plant {
                 let mut rotors = JointVector::zeros();
                 let mut driving = motor;
                 for (i, drive) in self.drives.iter().enumerate() {
-                    loss[i] = drive.loss(
-                        state.presliding[i],
-                        state.brake[i],
-                        state.qd[i],
-                        state.load[i],
-                        braked(i),
-                    );
+                    loss[i] = drive.loss(state.presliding[i], state.brake[i], state.qd[i], state.load[i], braked(i));
                     driving[i] -= loss[i].friction + loss[i].brake;
                     rotors[i] = drive.rotor;
                 }
@@ -265,29 +217,14 @@ impl Plant {
             }
         };
         let acceleration = tip.jacobian * qdd + tip.jdot_qd;
-        Evaluation {
-            qdd,
-            theta_ddot,
-            motor,
-            loss,
-            transmitted,
-            pose: tip.pose,
-            twist: tip.twist,
-            acceleration,
-            touch,
-        }
+        Evaluation { qdd, theta_ddot, motor, loss, transmitted, pose: tip.pose, twist: tip.twist, acceleration, touch }
     }
 
     fn touch(&self, pose: &Pose, twist: &Spatial, state: &State) -> Touch {
         let mut touch = Touch::NONE;
         let mut first = 0;
         for contact in &self.contacts {
-            contact.add_to(
-                &mut touch,
-                pose,
-                twist,
-                &state.contact[first..first + contact.points()],
-            );
+            contact.add_to(&mut touch, pose, twist, &state.contact[first..first + contact.points()]);
             first += contact.points();
         }
         touch
@@ -306,8 +243,6 @@ impl Plant {
 
 /// Inertia that a torque on one joint feels while the others are free, 1/(M⁻¹)_ii, kg m².
 fn felt_inertia(arm: &ArmModel, q: &JointVector) -> Result<JointVector, String> {
-    let inverse = arm::crba(arm, q)
-        .try_inverse()
-        .ok_or("the arm's mass matrix at the start posture is singular")?;
+    let inverse = arm::crba(arm, q).try_inverse().ok_or("the arm's mass matrix at the start posture is singular")?;
     Ok(JointVector::from_fn(|i, _| 1.0 / inverse[(i, i)]))
 }

@@ -36,16 +36,12 @@ impl Sensor {
         let r = &now.pose.r;
         let from_tip = r * (self.origin + self.com);
         let (omega, alpha) = (part(&now.twist, 3), part(&now.acceleration, 3));
-        let a_com = part(&now.acceleration, 0)
-            + alpha.cross(&from_tip)
-            + omega.cross(&omega.cross(&from_tip));
+        let a_com = part(&now.acceleration, 0) + alpha.cross(&from_tip) + omega.cross(&omega.cross(&from_tip));
         let inertial = (a_com - self.gravity) * self.mass;
         let contact = part(&now.touch.wrench, 0);
         let force = inertial + contact;
         let tip_from_sensor = r * -self.origin;
-        let moment = (r * self.com).cross(&inertial)
-            + tip_from_sensor.cross(&contact)
-            + part(&now.touch.wrench, 3);
+        let moment = (r * self.com).cross(&inertial) + tip_from_sensor.cross(&contact) + part(&now.touch.wrench, 3);
         let (force, moment) = (r.tr_mul(&force), r.tr_mul(&moment));
         [force.x, force.y, force.z, moment.x, moment.y, moment.z]
     }

@@ -23,9 +23,7 @@ fn the_arm_below_breakaway_stays_at_rest_for_60_s_with_its_brakes_off() {
     let drives = scenario.drives().expect("built in");
     let mut bench = Bench::new(&scenario);
     // the motors carry 95 % of what the links ask for; friction holds the rest
-    let volts = std::array::from_fn(|i| {
-        0.95 * bench.sim.state().load[i] / drives.joints[i].amplifier_nm_per_v
-    });
+    let volts = std::array::from_fn(|i| 0.95 * bench.sim.state().load[i] / drives.joints[i].amplifier_nm_per_v);
     bench.window(1_000_000, &[free(0, volts)]);
     // the ring-down of the brakes' release
     bench.run(10.0);

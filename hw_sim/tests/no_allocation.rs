@@ -41,10 +41,7 @@ fn a_step_in_steady_state_does_not_allocate() {
         let before = COUNT.with(Cell::get);
         for _ in 0..20 {
             let at = bench.t;
-            bench.window(
-                at + 5_000_000,
-                &[free(at + 1_000_001, [0.0, -3.1, -0.9, 4.2, 1.9, -0.1, 0.0])],
-            );
+            bench.window(at + 5_000_000, &[free(at + 1_000_001, [0.0, -3.1, -0.9, 4.2, 1.9, -0.1, 0.0])]);
         }
         assert_eq!(COUNT.with(Cell::get) - before, 0, "{integrator}");
         assert!(bench.out.mail.plant.len() >= 51);

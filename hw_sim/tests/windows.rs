@@ -24,10 +24,7 @@ fn force(newton: f64) -> [f64; 7] {
 #[test]
 fn a_window_has_a_sample_at_its_start_at_every_grid_point_and_at_its_end() {
     let mut bench = Bench::new(&scenario(&[]));
-    assert_eq!(
-        bench.out.mail.plant.iter().map(|s| s.t).collect::<Vec<_>>(),
-        [0]
-    );
+    assert_eq!(bench.out.mail.plant.iter().map(|s| s.t).collect::<Vec<_>>(), [0]);
     for (until, expected) in [
         (250_000, vec![0, 100_000, 200_000, 250_000]),
         (250_000, vec![250_000]),
@@ -35,20 +32,8 @@ fn a_window_has_a_sample_at_its_start_at_every_grid_point_and_at_its_end() {
         (420_000, vec![400_000, 420_000]),
     ] {
         bench.window(until, &[]);
-        assert_eq!(
-            bench.out.mail.plant.iter().map(|s| s.t).collect::<Vec<_>>(),
-            expected
-        );
-        assert_eq!(
-            bench
-                .out
-                .mail
-                .plant_probe
-                .iter()
-                .map(|p| p.t)
-                .collect::<Vec<_>>(),
-            [until]
-        );
+        assert_eq!(bench.out.mail.plant.iter().map(|s| s.t).collect::<Vec<_>>(), expected);
+        assert_eq!(bench.out.mail.plant_probe.iter().map(|p| p.t).collect::<Vec<_>>(), [until]);
     }
 }
 
@@ -65,11 +50,7 @@ fn cutting_windows_anywhere_gives_the_same_bits() {
         let mut samples: Vec<PlantSample> = Vec::new();
         for &until in cuts {
             let from = bench.t;
-            let due: Vec<_> = commands
-                .iter()
-                .copied()
-                .filter(|c| (from..until).contains(&c.t))
-                .collect();
+            let due: Vec<_> = commands.iter().copied().filter(|c| (from..until).contains(&c.t)).collect();
             bench.window(until, &due);
             samples.extend(bench.out.mail.plant.iter().filter(|s| s.t % 100_000 == 0));
         }
@@ -80,12 +61,8 @@ fn cutting_windows_anywhere_gives_the_same_bits() {
     assert_eq!(whole.1.len(), 101);
     for cuts in [
         &[5_000_000, 10_000_000][..],
-        &[
-            1, 1_234_567, 1_234_568, 4_000_000, 4_000_000, 7_777_777, 10_000_000,
-        ],
-        &[
-            99_999, 100_000, 100_001, 1_200_000, 3_950_000, 4_000_001, 9_999_999, 10_000_000,
-        ],
+        &[1, 1_234_567, 1_234_568, 4_000_000, 4_000_000, 7_777_777, 10_000_000],
+        &[99_999, 100_000, 100_001, 1_200_000, 3_950_000, 4_000_001, 9_999_999, 10_000_000],
     ] {
         let cut = run(cuts);
         assert_eq!(cut.0, whole.0);
@@ -98,23 +75,11 @@ fn a_torque_acts_from_its_exact_instant_on() {
     let mut scenario = slide(0.0);
     scenario.plant.integrator = scenario::Integrator::Rk4;
     let mut bench = Bench::new(&scenario);
-    bench.window(
-        1_000_000,
-        &[free(0, force(0.0)), free(123_456, force(50.0))],
-    );
+    bench.window(1_000_000, &[free(0, force(0.0)), free(123_456, force(50.0))]);
     bench.window(5_000_000, &[free(2_000_001, force(0.0))]);
-    let (t1, t2, a) = (
-        (2_000_001.0 - 123_456.0) * 1e-9,
-        (5_000_000.0 - 2_000_001.0) * 1e-9,
-        5.0,
-    );
+    let (t1, t2, a) = ((2_000_001.0 - 123_456.0) * 1e-9, (5_000_000.0 - 2_000_001.0) * 1e-9, 5.0);
     let probe = bench.out.mail.plant_probe[0];
-    assert!(
-        (probe.qd[0] - a * t1).abs() < 1e-11,
-        "{} {}",
-        probe.qd[0],
-        a * t1
-    );
+    assert!((probe.qd[0] - a * t1).abs() < 1e-11, "{} {}", probe.qd[0], a * t1);
     assert!((probe.q[0] - (0.5 * a * t1 * t1 + a * t1 * t2)).abs() < 1e-12);
 }
 
@@ -146,32 +111,12 @@ fn a_runaway_is_reported_once_and_everything_stays_finite() {
         let mut events = 0;
         bench.window(1_000_000, &[free(0, force(torque))]);
         for _ in 0..200 {
-            events += bench
-                .out
-                .mail
-                .events
-                .iter()
-                .filter(|e| e.kind == EventKind::Diverged as u32)
-                .count();
+            events += bench.out.mail.events.iter().filter(|e| e.kind == EventKind::Diverged as u32).count();
             for sample in &bench.out.mail.plant {
-                assert!(
-                    sample
-                        .theta
-                        .iter()
-                        .chain(&sample.wrench)
-                        .chain(&sample.theta_dot)
-                        .all(|v| v.is_finite())
-                );
+                assert!(sample.theta.iter().chain(&sample.wrench).chain(&sample.theta_dot).all(|v| v.is_finite()));
             }
             let probe = bench.out.mail.plant_probe[0];
-            assert!(
-                probe
-                    .q
-                    .iter()
-                    .chain(&probe.qd)
-                    .chain(&[probe.energy])
-                    .all(|v| v.is_finite())
-            );
+            assert!(probe.q.iter().chain(&probe.qd).chain(&[probe.energy]).all(|v| v.is_finite()));
             bench.window(bench.t + 1_000_000, &[]);
         }
         assert_eq!(events, 1);
@@ -186,23 +131,14 @@ fn the_sensor_carries_the_tools_weight_and_the_contact() {
     let wrench = bench.out.mail.plant[0].wrench;
     // tool axis down: the flange pulls it up, which is −z of the sensor
     let weight = scenario.arm.tool.mass_kg * 9.81;
-    assert!(
-        (wrench[2] + weight).abs() < 1e-9 && wrench[0].abs() < 1e-9 && wrench[1].abs() < 1e-9,
-        "{wrench:?}"
-    );
+    assert!((wrench[2] + weight).abs() < 1e-9 && wrench[0].abs() < 1e-9 && wrench[1].abs() < 1e-9, "{wrench:?}");
     assert!(wrench[3..].iter().all(|m| m.abs() < 1e-9));
 
     let mut pressed = scenario.clone();
     pressed.surfaces[0].position_m[2] = -0.002;
     let bench = Bench::new(&pressed);
-    let (wrench, probe) = (
-        bench.out.mail.plant[0].wrench,
-        bench.out.mail.plant_probe[0],
-    );
+    let (wrench, probe) = (bench.out.mail.plant[0].wrench, bench.out.mail.plant_probe[0]);
     assert!((probe.contact[2] - 20.0).abs() < 1e-9 && (probe.penetration - 0.002).abs() < 1e-12);
     assert!((wrench[2] - (20.0 - weight)).abs() < 1e-9);
-    assert_eq!(
-        bench.out.mail.events[0].kind,
-        EventKind::FirstContact as u32
-    );
+    assert_eq!(bench.out.mail.events[0].kind, EventKind::FirstContact as u32);
 }

@@ -52,10 +52,7 @@ impl PegInHole {
         if n < SAMPLES {
             self.rim(pose, Vector3::new(cos, sin, 0.0) * self.peg_radius)
         } else {
-            self.lip(
-                pose,
-                Vector3::new(self.bore_radius * cos, self.bore_radius * sin, self.chamfer),
-            )
+            self.lip(pose, Vector3::new(self.bore_radius * cos, self.bore_radius * sin, self.chamfer))
         }
     }
 
@@ -72,13 +69,8 @@ impl PegInHole {
         let wall = radius - self.bore_radius;
         let diagonal = std::f64::consts::FRAC_1_SQRT_2;
         let mut nearest = (at.z, up);
-        for (distance, normal) in [
-            (wall, inward),
-            (
-                (wall - self.chamfer + at.z) * diagonal,
-                (inward + up) * diagonal,
-            ),
-        ] {
+        for (distance, normal) in [(wall, inward), ((wall - self.chamfer + at.z) * diagonal, (inward + up) * diagonal)]
+        {
             if distance < nearest.0 {
                 nearest = (distance, normal);
             }
@@ -91,11 +83,7 @@ impl PegInHole {
         if floor > 0.0 && wall < 0.0 || floor > nearest.0 {
             nearest = (floor, up);
         }
-        Point {
-            lever,
-            normal: self.axes * nearest.1,
-            penetration: nearest.0,
-        }
+        Point { lever, normal: self.axes * nearest.1, penetration: nearest.0 }
     }
 
     /// A point of the bore's lip (hole axes) against the peg's side.
@@ -111,20 +99,10 @@ impl PegInHole {
         let inside = self.peg_radius - radius;
         let behind = -on_peg.z;
         let beside = behind <= 0.0 || behind > self.peg_length || inside > behind;
-        Point {
-            lever,
-            normal: pose.r * -outward,
-            penetration: if beside { f64::NEG_INFINITY } else { inside },
-        }
+        Point { lever, normal: pose.r * -outward, penetration: if beside { f64::NEG_INFINITY } else { inside } }
     }
 
-    pub(super) fn add_to(
-        &self,
-        touch: &mut Touch,
-        pose: &Pose,
-        twist: &Spatial,
-        bristles: &[Vector3<f64>],
-    ) {
+    pub(super) fn add_to(&self, touch: &mut Touch, pose: &Pose, twist: &Spatial, bristles: &[Vector3<f64>]) {
         for (n, bristle) in bristles.iter().enumerate() {
             let point = self.point(pose, n);
             let velocity = at_lever(twist, &point.lever);
@@ -133,9 +111,7 @@ impl PegInHole {
             let normal = self.material.normal_force(point.penetration, rate);
             if normal > 0.0 {
                 let held = self.material.held(*bristle, normal);
-                let friction =
-                    self.material
-                        .friction_force(held, tangential(velocity, &point.normal), normal);
+                let friction = self.material.friction_force(held, tangential(velocity, &point.normal), normal);
                 touch.add_point(friction - point.normal * normal, point.lever);
             }
         }
@@ -155,8 +131,7 @@ impl PegInHole {
             let normal = self.material.normal_force(point.penetration, rate);
             *bristle = match normal > 0.0 {
                 true => {
-                    self.material.held(*bristle, normal)
-                        + tangential(at_lever(moving, &point.lever), &point.normal) * h
+                    self.material.held(*bristle, normal) + tangential(at_lever(moving, &point.lever), &point.normal) * h
                 }
                 false => Vector3::zeros(),
             };
@@ -166,8 +141,7 @@ impl PegInHole {
 
 /// Velocity of the tool's material at a lever from the tool point.
 fn at_lever(twist: &Spatial, lever: &Vector3<f64>) -> Vector3<f64> {
-    Vector3::new(twist[0], twist[1], twist[2])
-        + Vector3::new(twist[3], twist[4], twist[5]).cross(lever)
+    Vector3::new(twist[0], twist[1], twist[2]) + Vector3::new(twist[3], twist[4], twist[5]).cross(lever)
 }
 
 fn tangential(v: Vector3<f64>, normal: &Vector3<f64>) -> Vector3<f64> {
@@ -201,22 +175,14 @@ mod tests {
             bore_radius: R_PEG + CLEARANCE,
             chamfer: 0.003,
             depth: 0.04,
-            material: Material {
-                stiffness: 1e6,
-                hunt_crossley: 0.0,
-                friction,
-                damping_limit: f64::INFINITY,
-            },
+            material: Material { stiffness: 1e6, hunt_crossley: 0.0, friction, damping_limit: f64::INFINITY },
         }
     }
 
     /// Tool point at lateral x under the lip by `depth`, tilted about y so that the rim leans to +x.
     fn pose(hole: &PegInHole, x: f64, depth: f64, tilt: f64) -> Pose {
         let r = arm::rotation::exp(&Vector3::new(0.0, tilt, 0.0));
-        Pose {
-            p: Vector3::new(x, 0.0, hole.chamfer + depth),
-            r,
-        }
+        Pose { p: Vector3::new(x, 0.0, hole.chamfer + depth), r }
     }
 
     fn touch(hole: &PegInHole, pose: &Pose, twist: &Spatial, bristles: &[Vector3<f64>]) -> Touch {
@@ -231,18 +197,12 @@ mod tests {
     fn a_peg_that_lands_within_the_chamfer_is_guided_in_and_one_beyond_it_stands_on_the_plane() {
         let hole = hole(0.0);
         let inside = hole.chamfer + CLEARANCE;
-        for (error, guided) in [
-            (0.5 * inside, true),
-            (0.97 * inside, true),
-            (1.1 * inside, false),
-            (2.0 * inside, false),
-        ] {
+        for (error, guided) in
+            [(0.5 * inside, true), (0.97 * inside, true), (1.1 * inside, false), (2.0 * inside, false)]
+        {
             // lowered until it touches with 20 µm
             let mut z = -1e-3;
-            let at = |z: f64| Pose {
-                p: Vector3::new(error, 0.0, z),
-                r: Matrix3::identity(),
-            };
+            let at = |z: f64| Pose { p: Vector3::new(error, 0.0, z), r: Matrix3::identity() };
             while touch(&hole, &at(z), &Spatial::zeros(), &LOOSE).penetration < 2e-5 {
                 z += 1e-6;
             }
@@ -268,17 +228,10 @@ mod tests {
             let (mut low, mut high) = (0.0, 0.037);
             while high - low > 1e-6 {
                 let middle = 0.5 * (low + high);
-                if fits(middle) {
-                    low = middle
-                } else {
-                    high = middle
-                }
+                if fits(middle) { low = middle } else { high = middle }
             }
             let whitney = 2.0 * CLEARANCE / tilt;
-            assert!(
-                (low - whitney).abs() < 0.05 * whitney,
-                "tilt {tilt}: depth {low}, 2(R-r)/tilt {whitney}"
-            );
+            assert!((low - whitney).abs() < 0.05 * whitney, "tilt {tilt}: depth {low}, 2(R-r)/tilt {whitney}");
         }
     }
 
@@ -292,11 +245,7 @@ mod tests {
         };
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if side(middle) < 0.0 {
-                low = middle
-            } else {
-                high = middle
-            }
+            if side(middle) < 0.0 { low = middle } else { high = middle }
         }
         pose(hole, low, depth, tilt)
     }
@@ -306,10 +255,7 @@ mod tests {
         for friction in [0.1, 0.3] {
             // a tight fit: the theory neglects the tilt beside the friction angle
             let clearance = 4e-6;
-            let hole = PegInHole {
-                bore_radius: R_PEG + clearance,
-                ..hole(friction)
-            };
+            let hole = PegInHole { bore_radius: R_PEG + clearance, ..hole(friction) };
             for depth in [0.008, 0.02] {
                 // a slight press: one point of the rim and one of the lip
                 let mut at = pressed(&hole, depth, 1.02 * 2.0 * clearance / depth);
@@ -335,10 +281,7 @@ mod tests {
     fn a_peg_wedges_only_where_two_point_contact_comes_before_the_depth_mu_times_diameter() {
         let friction = 0.3;
         let hole = hole(friction);
-        for (depth, wedges) in [
-            (0.7 * friction * 2.0 * R_PEG, true),
-            (1.3 * friction * 2.0 * R_PEG, false),
-        ] {
+        for (depth, wedges) in [(0.7 * friction * 2.0 * R_PEG, true), (1.3 * friction * 2.0 * R_PEG, false)] {
             // tilted a little more than fits
             let at = pressed(&hole, depth, 1.3 * 2.0 * CLEARANCE / depth);
             // the bristles push the forces of rim and lip into the line between them
@@ -346,14 +289,7 @@ mod tests {
             for (n, bristle) in bristles.iter_mut().enumerate() {
                 let point = hole.point(&at, n);
                 if point.penetration > 0.0 {
-                    let other = hole.point(
-                        &at,
-                        if n < SAMPLES {
-                            SAMPLES + SAMPLES / 2
-                        } else {
-                            0
-                        },
-                    );
+                    let other = hole.point(&at, if n < SAMPLES { SAMPLES + SAMPLES / 2 } else { 0 });
                     let line = point.lever - other.lever;
                     let along = line / line.dot(&-point.normal);
                     *bristle = tangential(along, &point.normal) * point.penetration;
@@ -364,25 +300,15 @@ mod tests {
             // wedged: the two forces cancel with nobody pushing
             let axial = held.wrench[2].abs() + held.wrench[4].abs() / R_PEG;
             let unheld = free.wrench[4].abs() / R_PEG;
-            assert_eq!(
-                axial < 0.12 * unheld,
-                wedges,
-                "depth {depth}: {axial} N of {unheld} N"
-            );
+            assert_eq!(axial < 0.12 * unheld, wedges, "depth {depth}: {axial} N of {unheld} N");
         }
     }
 
     #[test]
     fn the_floor_stops_the_peg() {
         let hole = hole(0.0);
-        let at = Pose {
-            p: Vector3::new(0.0, 0.0, hole.depth + 1e-5),
-            r: Matrix3::identity(),
-        };
+        let at = Pose { p: Vector3::new(0.0, 0.0, hole.depth + 1e-5), r: Matrix3::identity() };
         let wrench = touch(&hole, &at, &Spatial::zeros(), &LOOSE).wrench;
-        assert!(
-            (wrench[2] - SAMPLES as f64 * 1e6 * 1e-5).abs() < 1e-6,
-            "{wrench}"
-        );
+        assert!((wrench[2] - SAMPLES as f64 * 1e6 * 1e-5).abs() < 1e-6, "{wrench}");
     }
 }

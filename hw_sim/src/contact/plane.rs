@@ -40,29 +40,18 @@ impl Plane {
     fn penetration(&self, pose: &Pose, twist: &Spatial) -> Option<(f64, f64)> {
         let from_point = pose.p - self.point;
         if let Some(edges) = &self.patch
-            && edges
-                .iter()
-                .any(|(direction, half)| direction.dot(&from_point).abs() > *half)
+            && edges.iter().any(|(direction, half)| direction.dot(&from_point).abs() > *half)
         {
             return None;
         }
-        Some((
-            -from_point.dot(&self.normal),
-            -velocity(twist).dot(&self.normal),
-        ))
+        Some((-from_point.dot(&self.normal), -velocity(twist).dot(&self.normal)))
     }
 
     fn tangential(&self, v: Vector3<f64>) -> Vector3<f64> {
         v - self.normal * self.normal.dot(&v)
     }
 
-    pub(super) fn add_to(
-        &self,
-        touch: &mut Touch,
-        pose: &Pose,
-        twist: &Spatial,
-        bristle: &Vector3<f64>,
-    ) {
+    pub(super) fn add_to(&self, touch: &mut Touch, pose: &Pose, twist: &Spatial, bristle: &Vector3<f64>) {
         let Some((x, rate)) = self.penetration(pose, twist) else {
             return;
         };
@@ -70,24 +59,13 @@ impl Plane {
         let normal = self.material.normal_force(x, rate);
         if normal > 0.0 {
             let held = self.material.held(*bristle, normal);
-            let friction =
-                self.material
-                    .friction_force(held, self.tangential(velocity(twist)), normal);
+            let friction = self.material.friction_force(held, self.tangential(velocity(twist)), normal);
             touch.add_point(friction - self.normal * normal, Vector3::zeros());
         }
     }
 
-    pub(super) fn advance(
-        &self,
-        bristle: &mut Vector3<f64>,
-        pose: &Pose,
-        twist: &Spatial,
-        moving: &Spatial,
-        h: f64,
-    ) {
-        let normal = self
-            .penetration(pose, twist)
-            .map_or(0.0, |(x, rate)| self.material.normal_force(x, rate));
+    pub(super) fn advance(&self, bristle: &mut Vector3<f64>, pose: &Pose, twist: &Spatial, moving: &Spatial, h: f64) {
+        let normal = self.penetration(pose, twist).map_or(0.0, |(x, rate)| self.material.normal_force(x, rate));
         *bristle = match normal > 0.0 {
             true => self.material.held(*bristle, normal) + self.tangential(velocity(moving)) * h,
             false => Vector3::zeros(),
@@ -105,38 +83,20 @@ mod tests {
     use nalgebra::Matrix3;
 
     fn board(friction: f64) -> Plane {
-        let material = Material {
-            stiffness: 1e4,
-            hunt_crossley: 0.0,
-            friction,
-            damping_limit: f64::INFINITY,
-        };
+        let material = Material { stiffness: 1e4, hunt_crossley: 0.0, friction, damping_limit: f64::INFINITY };
         // tilted, to be independent of the axes
         let normal = arm::rotation::exp(&Vector3::new(0.3, -0.2, 0.0)) * Vector3::z();
-        Plane {
-            point: Vector3::new(0.1, 0.2, 0.3),
-            normal,
-            material,
-            patch: None,
-        }
+        Plane { point: Vector3::new(0.1, 0.2, 0.3), normal, material, patch: None }
     }
 
     /// Drags the tool along the board through these tangential positions at this depth; the force on the board at each.
-    fn drag(
-        plane: &Plane,
-        depth: f64,
-        path: impl Iterator<Item = f64>,
-        h: f64,
-    ) -> Vec<(f64, Vector3<f64>)> {
+    fn drag(plane: &Plane, depth: f64, path: impl Iterator<Item = f64>, h: f64) -> Vec<(f64, Vector3<f64>)> {
         let along = plane.normal.cross(&Vector3::x()).normalize();
         let (mut bristle, mut x) = (Vector3::zeros(), 0.0);
         path.map(|next| {
             let v = along * ((next - x) / h);
             let twist = Spatial::new(v.x, v.y, v.z, 0.0, 0.0, 0.0);
-            let pose = Pose {
-                p: plane.point - plane.normal * depth + along * x,
-                r: Matrix3::identity(),
-            };
+            let pose = Pose { p: plane.point - plane.normal * depth + along * x, r: Matrix3::identity() };
             let mut touch = Touch::NONE;
             plane.add_to(&mut touch, &pose, &twist, &bristle);
             plane.advance(&mut bristle, &pose, &twist, &twist, h);
@@ -151,12 +111,7 @@ mod tests {
     fn the_force_stays_in_the_coulomb_cone_and_reaches_its_edge_when_sliding() {
         let plane = board(0.4);
         let h = 1e-4;
-        let forces = drag(
-            &plane,
-            2e-3,
-            (0..20_000).map(|n| 0.03 * libm::sin(6.0 * n as f64 * h)),
-            h,
-        );
+        let forces = drag(&plane, 2e-3, (0..20_000).map(|n| 0.03 * libm::sin(6.0 * n as f64 * h)), h);
         let mut edge = 0;
         for (_, force) in &forces {
             let normal = -force.dot(&plane.normal);
@@ -172,12 +127,7 @@ mod tests {
     fn a_push_below_the_cone_sticks_and_springs_back() {
         let plane = board(0.4);
         // 0.5 mm is 5 N of the 8 N that stick
-        let forces = drag(
-            &plane,
-            2e-3,
-            (0..=2000).map(|n| 5e-4 * (1.0 - (n as f64 / 1000.0 - 1.0).abs())),
-            1e-3,
-        );
+        let forces = drag(&plane, 2e-3, (0..=2000).map(|n| 5e-4 * (1.0 - (n as f64 / 1000.0 - 1.0).abs())), 1e-3);
         let back = forces.last().expect("a path").1;
         let rest = back + plane.normal * -back.dot(&plane.normal);
         assert!(rest.norm() < 0.02, "{rest}");
@@ -188,12 +138,7 @@ mod tests {
         let plane = board(0.4);
         let h = 1e-4;
         for (amplitude, omega) in [(3e-4, 20.0), (1e-3, 20.0), (0.02, 6.0)] {
-            let forces = drag(
-                &plane,
-                2e-3,
-                (0..30_000).map(|n| amplitude * libm::sin(omega * n as f64 * h)),
-                h,
-            );
+            let forces = drag(&plane, 2e-3, (0..30_000).map(|n| amplitude * libm::sin(omega * n as f64 * h)), h);
             let mut work = 0.0;
             for (power, _) in forces {
                 work += power * h;
@@ -209,15 +154,7 @@ mod tests {
         let at = |dx: f64| {
             let mut touch = Touch::NONE;
             let p = plane.point - plane.normal * 1e-3 + Vector3::x() * dx;
-            plane.add_to(
-                &mut touch,
-                &Pose {
-                    p,
-                    r: Matrix3::identity(),
-                },
-                &Spatial::zeros(),
-                &Vector3::zeros(),
-            );
+            plane.add_to(&mut touch, &Pose { p, r: Matrix3::identity() }, &Spatial::zeros(), &Vector3::zeros());
             touch.wrench.norm()
         };
         assert!(at(0.0) > 0.0 && at(0.2) == 0.0);

@@ -9,10 +9,7 @@ use scenario::Scenario;
 /// The built-in scenario `table-5-3` with these overrides, first variant.
 pub fn scenario(overrides: &[&str]) -> Scenario {
     let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
-    scenario::load("table-5-3", &overrides)
-        .expect("valid")
-        .scenario()
-        .expect("valid")
+    scenario::load("table-5-3", &overrides).expect("valid").scenario().expect("valid")
 }
 
 /// Hardware with its mail.
@@ -60,10 +57,5 @@ impl Bench {
 
 /// All amplifiers enabled, all brakes released.
 pub fn free(t: Ns, volts: [f64; 7]) -> AmplifierCommand {
-    AmplifierCommand {
-        t,
-        volts,
-        enabled: 0x7F,
-        brake_released: 0x7F,
-    }
+    AmplifierCommand { t, volts, enabled: 0x7F, brake_released: 0x7F }
 }

@@ -21,9 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for step in 0..STEPS {
             // a slightly different state each time, so that nothing can be taken out of the loop
             sensed.qd[0] = 1e-9 * f64::from(step);
-            sum += pipeline
-                .step(u64::from(step), 1e-6, &sensed, Mode::Law)
-                .torque[0];
+            sum += pipeline.step(u64::from(step), 1e-6, &sensed, Mode::Law).torque[0];
         }
         let ns = begin.elapsed().as_nanos() as f64 / f64::from(STEPS);
         println!("round {round}: {ns:.0} ns a control step");

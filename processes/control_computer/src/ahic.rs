@@ -25,25 +25,12 @@ pub struct Impedance {
 /// Ẍᵗ = M_d⁻¹ [ −F_e + (I−S) F_d − B_d (Ẋᵗ − S Ẋ_d) − K_d S (Xᵗ − X_d) ] + S Ẍ_d.
 ///
 /// The modified scheme (Figure 5.18) puts in the integrated Xᵗ, Ẋᵗ; the original one (Figure 5.1) the measured X, Ẋ.
-pub fn target_acceleration(
-    impedance: &Impedance,
-    xd: &Motion,
-    xt: &Pose,
-    xt_dot: &Spatial,
-    fe: &Spatial,
-) -> Spatial {
-    let Impedance {
-        selection: s,
-        mass: m,
-        damping: b,
-        stiffness: k,
-        force: fd,
-    } = impedance;
+pub fn target_acceleration(impedance: &Impedance, xd: &Motion, xt: &Pose, xt_dot: &Spatial, fe: &Spatial) -> Spatial {
+    let Impedance { selection: s, mass: m, damping: b, stiffness: k, force: fd } = impedance;
     let (xd_dot, xd_ddot) = (&xd.twist, &xd.acceleration);
     let x = difference(xt, &xd.pose);
     Spatial::from_fn(|i, _| {
-        (-fe[i] + (1.0 - s[i]) * fd[i] - b[i] * (xt_dot[i] - s[i] * xd_dot[i]) - k[i] * s[i] * x[i])
-            / m[i]
+        (-fe[i] + (1.0 - s[i]) * fd[i] - b[i] * (xt_dot[i] - s[i] * xd_dot[i]) - k[i] * s[i] * x[i]) / m[i]
             + s[i] * xd_ddot[i]
     })
 }
@@ -65,10 +52,7 @@ mod tests {
     }
 
     fn pose(p: Vector3<f64>, v: Vector3<f64>) -> Pose {
-        Pose {
-            p,
-            r: rotation::exp(&v),
-        }
+        Pose { p, r: rotation::exp(&v) }
     }
 
     #[test]
@@ -92,8 +76,7 @@ mod tests {
         let xd = Motion::at_rest(pose(Vector3::zeros(), Vector3::zeros()));
         for angle in [0.1, 1.0, 2.0, 3.0] {
             let xt = pose(Vector3::zeros(), Vector3::new(0.0, angle, 0.0));
-            let a =
-                target_acceleration(&impedance(), &xd, &xt, &Spatial::zeros(), &Spatial::zeros());
+            let a = target_acceleration(&impedance(), &xd, &xt, &Spatial::zeros(), &Spatial::zeros());
             assert!((a[4] + 25.0 * angle).abs() < 1e-9, "{angle}: {}", a[4]);
         }
     }

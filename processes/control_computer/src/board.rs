@@ -13,8 +13,7 @@ use crate::sensors::Sensors;
 use arm::JointVector;
 use board::{Board, Inputs, Outputs};
 use messages::{
-    Command, CommandKind, ControlProbe, Event, EventKind, JOINTS, Severity, Telemetry,
-    TransferRecord, limits,
+    Command, CommandKind, ControlProbe, Event, EventKind, JOINTS, Severity, Telemetry, TransferRecord, limits,
 };
 use scenario::Scenario;
 use vme::Ns;
@@ -69,9 +68,8 @@ impl Converters {
 impl ControlComputer {
     /// The control computer of this scenario. The message says what is wrong with rack, arm or drives.
     pub fn new(scenario: &Scenario) -> Result<ControlComputer, String> {
-        let task = scenario
-            .task_of("control_computer")
-            .ok_or("the rack has no task of the board `control_computer`")?;
+        let task =
+            scenario.task_of("control_computer").ok_or("the rack has no task of the board `control_computer`")?;
         let nothing = Telemetry {
             t: 0,
             written: 0,
@@ -113,28 +111,19 @@ impl ControlComputer {
         if transfer.is_read() {
             if transfer.addr == self.program.telemetry && transfer.is_ok() {
                 let [older, newer] = &self.telemetry;
-                let shown = if newer.written <= transfer.data_at {
-                    newer
-                } else {
-                    older
-                };
-                out.mail.telemetry.push(Telemetry {
-                    t: transfer.data_at,
-                    ..*shown
-                });
+                let shown = if newer.written <= transfer.data_at { newer } else { older };
+                out.mail.telemetry.push(Telemetry { t: transfer.data_at, ..*shown });
             }
-        } else if end == self.program.command + size_of::<Command>() as u32
-            && !self.on_the_way.is_empty()
-        {
+        } else if end == self.program.command + size_of::<Command>() as u32 && !self.on_the_way.is_empty() {
             // the last word of a command block; one whose write failed is lost, and its epoch will be missed
             let command = self.on_the_way.remove(0);
-            if transfer.is_ok() {
-                if let Err(refusal) = self.judge(&command) {
-                    let (epoch, reason) = (command.epoch.into(), f64::from(refusal as u32));
-                    let kind = EventKind::CommandRefused;
-                    let event = Event::new(transfer.data_at, kind, Severity::Warn, epoch, reason);
-                    out.mail.events.push(event);
-                }
+            if transfer.is_ok()
+                && let Err(refusal) = self.judge(&command)
+            {
+                let (epoch, reason) = (command.epoch.into(), f64::from(refusal as u32));
+                let kind = EventKind::CommandRefused;
+                let event = Event::new(transfer.data_at, kind, Severity::Warn, epoch, reason);
+                out.mail.events.push(event);
             }
         }
     }
@@ -171,13 +160,7 @@ impl ControlComputer {
         if let Some(read) = self.sensors.read(job) {
             let address = self.program.read_address(read).into();
             let severity = Severity::Warn;
-            out.mail.events.push(Event::new(
-                t,
-                EventKind::BusError,
-                severity,
-                job.into(),
-                address,
-            ));
+            out.mail.events.push(Event::new(t, EventKind::BusError, severity, job.into(), address));
         }
         let state = self.decide_state(t, now, out);
         let mode = match state {
@@ -185,13 +168,9 @@ impl ControlComputer {
             State::Stop => Mode::Brake,
             State::Off => Mode::Free,
         };
-        let since = self
-            .last
-            .map_or(self.period_ns, |last| now.saturating_sub(last).max(1));
+        let since = self.last.map_or(self.period_ns, |last| now.saturating_sub(last).max(1));
         self.last = Some(now);
-        let done = self
-            .pipeline
-            .step(now, since as f64 * 1e-9, self.sensors.sensed(), mode);
+        let done = self.pipeline.step(now, since as f64 * 1e-9, self.sensors.sensed(), mode);
         self.finite = done.torque.iter().all(|torque| torque.is_finite());
         let rest = match self.rest {
             _ if mode == Mode::Free || !self.finite => Rest::Stop,
@@ -199,23 +178,16 @@ impl ControlComputer {
             _ => Rest::Run,
         };
         let codes: [u32; JOINTS] = std::array::from_fn(|joint| {
-            let torque = if rest == Rest::Stop {
-                0.0
-            } else {
-                done.torque[joint]
-            };
+            let torque = if rest == Rest::Stop { 0.0 } else { done.torque[joint] };
             self.converters.code(joint, torque)
         });
         if self.rest != Some(rest) {
             out.rest = Some(self.program.after_decision(rest));
             self.rest = Some(rest);
         }
-        self.program
-            .words(rest, self.task, job, &codes, &mut out.mail.words);
+        self.program.words(rest, self.task, job, &codes, &mut out.mail.words);
         self.tell(t, &done, out);
-        out.mail
-            .control_probe
-            .push(self.probe(t, job, state, &done));
+        out.mail.control_probe.push(self.probe(t, job, state, &done));
         let written = t + self.program.execution_ns(rest);
         self.telemetry = [
             self.telemetry[1],
@@ -253,9 +225,7 @@ impl ControlComputer {
                 State::Stop | State::Off => Severity::Error,
             };
             let (from, to) = (f64::from(before as u32), f64::from(state as u32));
-            out.mail
-                .events
-                .push(Event::new(t, EventKind::SafetyState, severity, from, to));
+            out.mail.events.push(Event::new(t, EventKind::SafetyState, severity, from, to));
             if state == State::Hold {
                 self.pipeline.hold(self.sensors.sensed());
             }
@@ -268,38 +238,22 @@ impl ControlComputer {
         let segment = job.law.segment.unwrap_or(NO_SEGMENT);
         if segment != self.segment && segment != NO_SEGMENT {
             let kind = EventKind::SegmentStart;
-            out.mail
-                .events
-                .push(Event::new(t, kind, Severity::Ok, segment.into(), 0.0));
+            out.mail.events.push(Event::new(t, kind, Severity::Ok, segment.into(), 0.0));
         }
         self.segment = segment;
         if let Some(offset) = job.contact.tared {
-            out.mail
-                .events
-                .push(Event::new(t, EventKind::Tare, Severity::Ok, offset[2], 0.0));
+            out.mail.events.push(Event::new(t, EventKind::Tare, Severity::Ok, offset[2], 0.0));
         }
         let mut edges = |kind, before: u32, after: u32| {
             for bit in (0..32).filter(|bit| (before ^ after) >> bit & 1 == 1) {
                 let begins = after >> bit & 1;
-                let severity = if begins == 1 {
-                    Severity::Warn
-                } else {
-                    Severity::Ok
-                };
+                let severity = if begins == 1 { Severity::Warn } else { Severity::Ok };
                 let event = Event::new(t, kind, severity, begins.into(), bit.into());
                 out.mail.events.push(event);
             }
         };
-        edges(
-            EventKind::TargetErrorLimit,
-            self.target_limited,
-            job.law.target_limited,
-        );
-        edges(
-            EventKind::TorqueLimit,
-            self.torque_limited,
-            job.torque_limited,
-        );
+        edges(EventKind::TargetErrorLimit, self.target_limited, job.law.target_limited);
+        edges(EventKind::TorqueLimit, self.torque_limited, job.torque_limited);
         self.target_limited = job.law.target_limited;
         self.torque_limited = job.torque_limited;
     }
@@ -343,12 +297,7 @@ impl Board for ControlComputer {
         if inputs.boot {
             out.program = Some((self.task, self.program.until_decision()));
         }
-        for word in inputs
-            .mail
-            .words
-            .iter()
-            .filter(|word| word.task == self.task)
-        {
+        for word in inputs.mail.words.iter().filter(|word| word.task == self.task) {
             self.sensors.take(word);
         }
         for command in &inputs.mail.commands {
@@ -361,10 +310,7 @@ impl Board for ControlComputer {
         for transfer in &inputs.transfers {
             self.served(transfer, out);
         }
-        if let Some(decision) = inputs
-            .decision
-            .filter(|decision| decision.task == self.task)
-        {
+        if let Some(decision) = inputs.decision.filter(|decision| decision.task == self.task) {
             self.job(decision.job, inputs.until, now, out);
         }
     }

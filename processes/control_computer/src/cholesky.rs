@@ -22,22 +22,16 @@ impl Cholesky {
             largest = largest.max(row[i]);
         }
         for j in 0..DOF {
-            let mut pivot = a[j][j];
-            for k in 0..j {
-                pivot -= a[j][k] * a[j][k];
-            }
-            let inv = if pivot > SINGULAR * largest {
-                1.0 / pivot.sqrt()
-            } else {
-                0.0
-            };
+            let row = a[j];
+            let pivot = row[..j].iter().fold(row[j], |sum, entry| sum - entry * entry);
+            let inv = if pivot > SINGULAR * largest { 1.0 / pivot.sqrt() } else { 0.0 };
             a[j][j] = inv;
-            for i in j + 1..DOF {
-                let mut sum = a[i][j];
+            for below in &mut a[j + 1..] {
+                let mut sum = below[j];
                 for k in 0..j {
-                    sum -= a[i][k] * a[j][k];
+                    sum -= below[k] * row[k];
                 }
-                a[i][j] = sum * inv;
+                below[j] = sum * inv;
             }
         }
         Cholesky { l: a }
@@ -46,7 +40,7 @@ impl Cholesky {
     /// x of A x = b.
     pub fn solve(&self, b: &JointVector) -> JointVector {
         let l = &self.l;
-        let mut x = *b;
+        let mut x = b.data.0[0];
         for i in 0..DOF {
             for k in 0..i {
                 x[i] -= l[i][k] * x[k];
@@ -54,12 +48,12 @@ impl Cholesky {
             x[i] *= l[i][i];
         }
         for i in (0..DOF).rev() {
-            for k in i + 1..DOF {
-                x[i] -= l[k][i] * x[k];
-            }
             x[i] *= l[i][i];
+            for k in 0..i {
+                x[k] -= l[i][k] * x[i];
+            }
         }
-        x
+        JointVector::from(x)
     }
 }
 
@@ -74,8 +68,7 @@ mod tests {
         let mut a = [[0.0; DOF]; DOF];
         for (i, row) in a.iter_mut().enumerate() {
             for (j, entry) in row.iter_mut().enumerate() {
-                *entry =
-                    (0..DOF).map(|k| b(i, k) * b(j, k)).sum::<f64>() + f64::from(u8::from(i == j));
+                *entry = (0..DOF).map(|k| b(i, k) * b(j, k)).sum::<f64>() + f64::from(u8::from(i == j));
             }
         }
         let x = JointVector::from([1.0, -2.0, 3.0, 0.5, 0.0, -1.0, 2.0]);

@@ -51,38 +51,19 @@ pub enum Refusal {
 
 /// The segment that a [`Command`] of kind `Segment` describes.
 pub fn segment(command: &Command) -> Result<Segment, Refusal> {
-    let path = [
-        PathKind::Hold,
-        PathKind::PointToPoint,
-        PathKind::Line,
-        PathKind::Step,
-    ]
-    .into_iter()
-    .find(|path| *path as u32 == command.path)
-    .ok_or(Refusal::Path)?;
-    let six = [
-        command.selection,
-        command.mass,
-        command.damping,
-        command.stiffness,
-        command.force,
-    ];
+    let path = [PathKind::Hold, PathKind::PointToPoint, PathKind::Line, PathKind::Step]
+        .into_iter()
+        .find(|path| *path as u32 == command.path)
+        .ok_or(Refusal::Path)?;
+    let six = [command.selection, command.mass, command.damping, command.stiffness, command.force];
     let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
-    if !(six.iter().all(|values| finite(values))
-        && finite(&command.position)
-        && finite(&command.orientation))
-    {
+    if !(six.iter().all(|values| finite(values)) && finite(&command.position) && finite(&command.orientation)) {
         return Err(Refusal::NotFinite);
     }
     if command.mass.iter().any(|&m| m <= 0.0) {
         return Err(Refusal::Mass);
     }
-    if command
-        .damping
-        .iter()
-        .chain(&command.stiffness)
-        .any(|&value| value < 0.0)
-    {
+    if command.damping.iter().chain(&command.stiffness).any(|&value| value < 0.0) {
         return Err(Refusal::Impedance);
     }
     if command.selection.iter().any(|&s| s != 0.0 && s != 1.0) {
@@ -100,10 +81,7 @@ pub fn segment(command: &Command) -> Result<Segment, Refusal> {
         start: command.start,
         move_time: command.move_time,
         path,
-        target: Pose {
-            p: Vector3::from(command.position),
-            r: rotation_of_wxyz(command.orientation),
-        },
+        target: Pose { p: Vector3::from(command.position), r: rotation_of_wxyz(command.orientation) },
         impedance: Impedance {
             selection: Spatial::from(command.selection),
             mass: Spatial::from(command.mass),
@@ -141,10 +119,7 @@ mod tests {
     #[test]
     fn a_sound_command_becomes_its_segment() {
         let segment = segment(&command()).unwrap();
-        assert_eq!(
-            (segment.index, segment.start, segment.move_time),
-            (3, 1_000, 2_000)
-        );
+        assert_eq!((segment.index, segment.start, segment.move_time), (3, 1_000, 2_000));
         assert_eq!(segment.path, PathKind::Line);
         assert_eq!(segment.impedance.force[2], 20.0);
         // a turn about y by 2·acos 0.8
@@ -154,7 +129,8 @@ mod tests {
 
     #[test]
     fn every_impossible_command_is_refused_for_its_reason() {
-        let cases: [(fn(&mut Command), Refusal); 14] = [
+        type Spoil = fn(&mut Command);
+        let cases: [(Spoil, Refusal); 14] = [
             (|c| c.path = 4, Refusal::Path),
             (|c| c.position[1] = f64::NAN, Refusal::NotFinite),
             (|c| c.orientation[0] = f64::INFINITY, Refusal::NotFinite),

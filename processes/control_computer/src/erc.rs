@@ -17,15 +17,8 @@ pub struct Gains {
 }
 
 /// Ẍʳ = Ẍᵗ + K_v (Ẋᵗ − Ẋ) + K_p (Xᵗ − X).
-pub fn reference_acceleration(
-    gains: &Gains,
-    xt_ddot: &Spatial,
-    target: &Target,
-    tool: &TaskKinematics,
-) -> Spatial {
-    xt_ddot
-        + (target.twist - tool.twist) * gains.kv
-        + difference(&target.pose, &tool.pose) * gains.kp
+pub fn reference_acceleration(gains: &Gains, xt_ddot: &Spatial, target: &Target, tool: &TaskKinematics) -> Spatial {
+    xt_ddot + (target.twist - tool.twist) * gains.kv + difference(&target.pose, &tool.pose) * gains.kp
 }
 
 #[cfg(test)]
@@ -37,26 +30,17 @@ mod tests {
     #[test]
     fn the_tool_is_accelerated_towards_the_target_and_turned_towards_its_axes() {
         let target = Target {
-            pose: Pose {
-                p: Vector3::new(0.0, 0.0, 0.01),
-                r: rotation::exp(&Vector3::new(0.0, 0.02, 0.0)),
-            },
+            pose: Pose { p: Vector3::new(0.0, 0.0, 0.01), r: rotation::exp(&Vector3::new(0.0, 0.02, 0.0)) },
             twist: Spatial::new(0.0, 0.3, 0.0, 0.0, 0.0, 0.1),
         };
         let tool = TaskKinematics {
-            pose: Pose {
-                p: Vector3::zeros(),
-                r: Matrix3::identity(),
-            },
+            pose: Pose { p: Vector3::zeros(), r: Matrix3::identity() },
             twist: Spatial::new(0.0, 0.1, 0.0, 0.0, 0.0, 0.0),
             jacobian: Jacobian::zeros(),
             jdot_qd: Spatial::zeros(),
         };
         let xt_ddot = Spatial::repeat(1.0);
-        let gains = Gains {
-            kp: 100.0,
-            kv: 20.0,
-        };
+        let gains = Gains { kp: 100.0, kv: 20.0 };
         let a = reference_acceleration(&gains, &xt_ddot, &target, &tool);
         assert!((a - Spatial::new(1.0, 5.0, 2.0, 1.0, 3.0, 3.0)).amax() < 1e-12);
     }

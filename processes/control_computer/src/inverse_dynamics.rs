@@ -77,10 +77,7 @@ mod tests {
         let model = ArmModel::rediestro();
         let drives = Drives::new(&DriveData::rediestro(), 0.0);
         let q = JointVector::from([0.3, -0.4, 0.9, -1.2, 0.5, 0.7, -0.2]);
-        let (qd, qdd) = (
-            JointVector::repeat(0.4),
-            JointVector::from_fn(|i, _| i as f64 - 3.0),
-        );
+        let (qd, qdd) = (JointVector::repeat(0.4), JointVector::from_fn(|i, _| i as f64 - 3.0));
         let fe = Spatial::new(3.0, -5.0, 60.0, 1.0, 0.5, -0.2);
         let state = ArmState::new(&model, &q, &qd);
         let contact = transposed_times(&state.jacobian(), &fe);
@@ -93,10 +90,7 @@ mod tests {
     fn friction_is_fed_forward_in_its_share_with_a_smooth_sign() {
         let data = DriveData::rediestro();
         let drives = Drives::new(&data, 0.8);
-        let (coulomb, viscous) = (
-            data.joints[0].coulomb_nm,
-            data.joints[0].viscous_nms_per_rad,
-        );
+        let (coulomb, viscous) = (data.joints[0].coulomb_nm, data.joints[0].viscous_nms_per_rad);
         let at = |v: f64| drives.friction(&JointVector::repeat(v))[0];
         assert_eq!(at(0.0), 0.0);
         assert!((at(1.0) - 0.8 * (coulomb + viscous)).abs() < 1e-3);

@@ -33,10 +33,7 @@ pub struct LimitTask {
 impl LimitTask {
     /// Nothing asked for.
     pub fn none() -> LimitTask {
-        LimitTask {
-            weight: JointVector::zeros(),
-            acceleration: JointVector::zeros(),
-        }
+        LimitTask { weight: JointVector::zeros(), acceleration: JointVector::zeros() }
     }
 
     /// Whether a joint is in a buffer.

@@ -21,6 +21,8 @@ pub struct Law {
     gains: Gains,
     weights: Weights,
     joint_limits: Option<JointLimits>,
+    /// The joint speeds of Ẋᵗ are wanted (for friction).
+    resolves_speed: bool,
     bounds: Bounds,
     /// Impedance where no segment says otherwise.
     resting: Impedance,
@@ -44,7 +46,7 @@ pub struct Decided {
     pub xr_ddot: Spatial,
     /// q̈ᵗ (rad/s²).
     pub qdd: JointVector,
-    /// Joint speeds of Ẋᵗ (rad/s).
+    /// Joint speeds of Ẋᵗ, zero where friction is not fed forward (rad/s).
     pub target_speed: JointVector,
     /// Axes on which |Xᵗ − X| was at its limit: bits 0–2 the translations, bit 3 the rotation.
     pub target_limited: u32,
@@ -83,16 +85,10 @@ impl Law {
             stiffness: six(rest.stiffness_n_per_m, rest.rotational_stiffness_nm_per_rad),
             force: Spatial::zeros(),
         };
-        let start = Pose {
-            p: scenario.arm.start_position_m.into(),
-            r: scenario::rpy_deg(scenario.arm.start_rpy_deg),
-        };
+        let start = Pose { p: scenario.arm.start_position_m.into(), r: scenario::rpy_deg(scenario.arm.start_rpy_deg) };
         Law {
             scheme: controller.scheme,
-            gains: Gains {
-                kp: controller.kp,
-                kv: controller.kv,
-            },
+            gains: Gains { kp: controller.kp, kv: controller.kv },
             weights: Weights {
                 task: Spatial::from(controller.task_weight),
                 joint: JointVector::from(controller.joint_weight),
@@ -105,6 +101,7 @@ impl Law {
                 kp: limits.kp,
                 max_weight: limits.max_weight,
             }),
+            resolves_speed: controller.friction_compensation > 0.0,
             bounds: Bounds {
                 linear: [controller.max_target_error_m; 3],
                 angular: controller.max_target_error_deg.to_radians(),
@@ -133,13 +130,7 @@ impl Law {
     }
 
     /// One job at `now`: TG → AHIC → ERC → RR.
-    pub fn decide(
-        &mut self,
-        now: Ns,
-        sensed: &Sensed,
-        tool: &TaskKinematics,
-        fe: &Spatial,
-    ) -> Decided {
+    pub fn decide(&mut self, now: Ns, sensed: &Sensed, tool: &TaskKinematics, fe: &Spatial) -> Decided {
         let (x, x_dot) = (&tool.pose, &tool.twist);
         if self.target.is_none() {
             self.trajectory.rest_at(*x, self.resting);
@@ -158,10 +149,7 @@ impl Law {
                 xr_ddot = reference_acceleration(&self.gains, &xt_ddot, target, tool);
             }
             Scheme::Original => {
-                *target = Target {
-                    pose: *x,
-                    twist: *x_dot,
-                };
+                *target = Target { pose: *x, twist: *x_dot };
                 target_limited = 0;
                 xt_ddot = target_acceleration(impedance, &xd, x, x_dot, fe);
                 xr_ddot = xt_ddot;
@@ -177,14 +165,14 @@ impl Law {
             segment: self.trajectory.segment(),
             fd: impedance.force,
             xd,
-            xt: Motion {
-                pose: target.pose,
-                twist: target.twist,
-                acceleration: xt_ddot,
-            },
+            xt: Motion { pose: target.pose, twist: target.twist, acceleration: xt_ddot },
             xr_ddot,
             qdd: resolution.joint_acceleration(&xr_ddot, &sensed.qd),
-            target_speed: resolution.joint_speed(&target.twist),
+            target_speed: if self.resolves_speed {
+                resolution.joint_speed(&target.twist)
+            } else {
+                JointVector::zeros()
+            },
             target_limited,
             near_joint_limit: limits.is_active(),
         }
@@ -192,13 +180,7 @@ impl Law {
 
     /// Carries Xᵗ on to the next job, `dt` seconds later. While torques are cut the tool cannot follow, and Xᵗ may not
     /// get further away from it than it is.
-    pub fn carry_on(
-        &mut self,
-        decided: &Decided,
-        tool: &TaskKinematics,
-        torque_cut: bool,
-        dt: f64,
-    ) {
+    pub fn carry_on(&mut self, decided: &Decided, tool: &TaskKinematics, torque_cut: bool, dt: f64) {
         let Some(target) = &mut self.target else {
             return;
         };

@@ -3,9 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    pacing::serve(&|_, context| {
-        Ok(Box::new(control_computer::ControlComputer::new(
-            &context.scenario,
-        )?))
-    })
+    pacing::serve(&|_, context| Ok(Box::new(control_computer::ControlComputer::new(&context.scenario)?)))
 }

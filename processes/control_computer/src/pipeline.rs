@@ -109,8 +109,8 @@ impl Pipeline {
         match mode {
             Mode::Law => {
                 job.law = self.law.decide(now, sensed, &tool, &contact.fe);
-                job.torque = motion_torque(&arm, &self.drives, &job.law.qdd)
-                    + self.drives.friction(&job.law.target_speed);
+                job.torque =
+                    motion_torque(&arm, &self.drives, &job.law.qdd) + self.drives.friction(&job.law.target_speed);
                 if self.force_feed_forward {
                     job.torque += contact_torque(&tool, &contact.fe);
                 }

@@ -115,31 +115,20 @@ impl BusProgram {
                 .iter()
                 .find(|slave| slave.name == card)
                 .ok_or_else(|| format!("the rack has no card `{card}`"))?;
-            Ok::<Access, String>(Access {
-                am: slave.am,
-                addr: slave.base + offset,
-                width,
-                dir,
-                n: 1,
-            })
+            Ok::<Access, String>(Access { am: slave.am, addr: slave.base + offset, width, dir, n: 1 })
         };
         let (read, write) = (Direction::Read, Direction::Write);
         // an idealised receiver of more than 16 bits has words, and strides, of twice the size
-        let (word, stride) = if is_wide(scenario) {
-            (Width::D32, 2)
-        } else {
-            (Width::D16, 1)
-        };
+        let (word, stride) = if is_wide(scenario) { (Width::D32, 2) } else { (Width::D16, 1) };
         let filter = match scenario.force_sensor_if.filter {
             ForceFilter::Cascade(n) => u32::from(n),
             ForceFilter::DelayMs(_) => 0,
         };
-        let force_word =
-            |offset: u32| register("force-sensor", stride * offset, word, Direction::Read);
+        let force_word = |offset: u32| register("force-sensor", stride * offset, word, Direction::Read);
         let status = register("parallel-io", parallel::INPUT, Width::D32, read)?;
         let mut reads = [status; READS];
         let mut codes = [status; JOINTS];
-        for joint in 0..JOINTS {
+        for (joint, code) in codes.iter_mut().enumerate() {
             let card = format!("encoder-{}", joint / encoder::CHANNELS_PER_CARD + 1);
             let channel = encoder::CHANNEL * (joint % encoder::CHANNELS_PER_CARD) as u32;
             let at = COUNTS + 2 * joint;
@@ -147,7 +136,7 @@ impl BusProgram {
             reads[at + 1] = register(&card, channel + encoder::VELOCITY, Width::D32, read)?;
             let card = format!("da-{}", joint / da::CHANNELS_PER_CARD + 1);
             let channel = (joint % da::CHANNELS_PER_CARD) as u32;
-            codes[joint] = register(&card, da::code(channel), Width::D32, write)?;
+            *code = register(&card, da::code(channel), Width::D32, write)?;
         }
         for axis in 0..6 {
             reads[FORCES + axis] = force_word(force::filter(filter) + 2 * axis as u32)?;
@@ -193,14 +182,7 @@ impl BusProgram {
     }
 
     /// The words that the job's writes carry.
-    pub fn words(
-        &self,
-        rest: Rest,
-        task: u16,
-        job: u32,
-        codes: &[u32; JOINTS],
-        out: &mut Vec<BusWord>,
-    ) {
+    pub fn words(&self, rest: Rest, task: u16, job: u32, codes: &[u32; JOINTS], out: &mut Vec<BusWord>) {
         for (i, &write) in rest.writes().iter().enumerate() {
             out.push(BusWord {
                 t: 0,

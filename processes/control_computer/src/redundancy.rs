@@ -6,7 +6,7 @@
 //! the price of the gain σ²/(σ² + w_v) along a singular value σ. Directions without any weight get no acceleration.
 
 use crate::cholesky::Cholesky;
-use crate::frame::{TaskKinematics, transposed_times};
+use crate::frame::{TaskKinematics, dot, transposed_times};
 use crate::joint_limits::LimitTask;
 use arm::{DOF, Jacobian, JointVector, Spatial};
 
@@ -32,11 +32,7 @@ pub struct Resolution<'a> {
 
 impl<'a> Resolution<'a> {
     /// Factorises JᵀWJ + W_c + W_v.
-    pub fn new(
-        weights: &'a Weights,
-        tool: &'a TaskKinematics,
-        limits: &'a LimitTask,
-    ) -> Resolution<'a> {
+    pub fn new(weights: &'a Weights, tool: &'a TaskKinematics, limits: &'a LimitTask) -> Resolution<'a> {
         let diagonal = weights.joint + limits.weight;
         Resolution {
             weights,
@@ -48,11 +44,7 @@ impl<'a> Resolution<'a> {
 
     /// q̈ᵗ = [JᵀWJ + W_c + W_v]⁻¹ [ JᵀW(Ẍʳ − J̇q̇) + W_c z̈ʳ − λ W_v q̇ ].
     pub fn joint_acceleration(&self, xr_ddot: &Spatial, qd: &JointVector) -> JointVector {
-        let Weights {
-            task: w,
-            joint: wv,
-            lambda,
-        } = self.weights;
+        let Weights { task: w, joint: wv, lambda } = self.weights;
         let (wc, zr_ddot) = (&self.limits.weight, &self.limits.acceleration);
         let weighted = w.component_mul(&(xr_ddot - self.tool.jdot_qd));
         self.normal.solve(
@@ -64,22 +56,20 @@ impl<'a> Resolution<'a> {
     /// Joint speeds that give the tool the twist Ẋ, resolved alike: [JᵀWJ + W_c + W_v]⁻¹ JᵀW Ẋ.
     pub fn joint_speed(&self, twist: &Spatial) -> JointVector {
         let weighted = self.weights.task.component_mul(twist);
-        self.normal
-            .solve(&transposed_times(&self.tool.jacobian, &weighted))
+        self.normal.solve(&transposed_times(&self.tool.jacobian, &weighted))
     }
 }
 
 /// Lower triangle of JᵀWJ + diag.
 fn normal_matrix(j: &Jacobian, w: &Spatial, diagonal: &JointVector) -> [[f64; DOF]; DOF] {
+    let (j, w) = (&j.data.0, &w.data.0[0]);
     let mut a = [[0.0; DOF]; DOF];
-    for (row, entries) in a.iter_mut().enumerate() {
-        let weighted: [f64; 6] = std::array::from_fn(|k| j[(k, row)] * w[k]);
-        for (column, entry) in entries.iter_mut().enumerate().take(row + 1) {
-            for (k, wj) in weighted.iter().enumerate() {
-                *entry += wj * j[(k, column)];
-            }
+    for row in 0..DOF {
+        let weighted: [f64; 6] = std::array::from_fn(|k| j[row][k] * w[k]);
+        for column in 0..=row {
+            a[row][column] = dot(&weighted, &j[column]);
         }
-        entries[row] += diagonal[row];
+        a[row][row] += diagonal[row];
     }
     a
 }
@@ -95,10 +85,7 @@ mod tests {
 
     fn tool_at(q: &JointVector, qd: &JointVector) -> TaskKinematics {
         let model = ArmModel::rediestro();
-        let base = Pose {
-            p: Vector3::zeros(),
-            r: Matrix3::identity(),
-        };
+        let base = Pose { p: Vector3::zeros(), r: Matrix3::identity() };
         TaskFrame::new(&base).kinematics(&ArmState::new(&model, q, qd).tip_motion())
     }
 
@@ -107,11 +94,7 @@ mod tests {
     }
 
     fn weights(joint: f64, lambda: f64) -> Weights {
-        Weights {
-            task: Spatial::new(1.0, 2.0, 0.5, 1.0, 3.0, 1.0),
-            joint: JointVector::repeat(joint),
-            lambda,
-        }
+        Weights { task: Spatial::new(1.0, 2.0, 0.5, 1.0, 3.0, 1.0), joint: JointVector::repeat(joint), lambda }
     }
 
     /// The cost that RR is to minimise, as the module's documentation states it.
@@ -148,13 +131,8 @@ mod tests {
                 let rise = cost(&weights, &tool, &limits, &xr, &qd, &other) - least;
                 // at the minimum the cost rises by ½ h² times its curvature, the same both ways
                 let column = tool.jacobian.column(i);
-                let curvature = column.component_mul(&weights.task).dot(&column)
-                    + weights.joint[i]
-                    + limits.weight[i];
-                assert!(
-                    (rise - step * step * curvature).abs() < 1e-12,
-                    "{i}: {rise}"
-                );
+                let curvature = column.component_mul(&weights.task).dot(&column) + weights.joint[i] + limits.weight[i];
+                assert!((rise - step * step * curvature).abs() < 1e-12, "{i}: {rise}");
             }
         }
     }
@@ -164,10 +142,7 @@ mod tests {
         let tool = tool_at(&table_top(), &JointVector::zeros());
         let svd = tool.jacobian.svd(true, false);
         let w = 1e-2;
-        let weights = Weights {
-            task: Spatial::repeat(1.0),
-            ..weights(w, 0.0)
-        };
+        let weights = Weights { task: Spatial::repeat(1.0), ..weights(w, 0.0) };
         let limits = LimitTask::none();
         let rr = Resolution::new(&weights, &tool, &limits);
         let u = svd.u.unwrap();
@@ -175,10 +150,7 @@ mod tests {
             let direction: Spatial = u.column(k).into();
             let reached = tool.jacobian * rr.joint_acceleration(&direction, &JointVector::zeros());
             let sigma2 = svd.singular_values[k].powi(2);
-            assert!(
-                (reached - direction * (sigma2 / (sigma2 + w))).amax() < 1e-9,
-                "{k}"
-            );
+            assert!((reached - direction * (sigma2 / (sigma2 + w))).amax() < 1e-9, "{k}");
         }
     }
 
@@ -204,10 +176,7 @@ mod tests {
             qd += qdd * dt;
         }
         let along = qd.dot(&null(&q)).abs();
-        assert!(
-            (along / (0.5 * libm::exp(-lambda)) - 1.0).abs() < 0.03,
-            "{along}"
-        );
+        assert!((along / (0.5 * libm::exp(-lambda)) - 1.0).abs() < 0.03, "{along}");
         let end = tool_at(&q, &qd).pose;
         assert!((end.p - start.p).amax() < 2e-3, "{}", end.p - start.p);
     }
@@ -215,10 +184,7 @@ mod tests {
     #[test]
     fn one_joint_that_alone_moves_the_tool_needs_no_weight_of_its_own() {
         let model = ArmModel::slide(3.0);
-        let base = Pose {
-            p: Vector3::zeros(),
-            r: Matrix3::identity(),
-        };
+        let base = Pose { p: Vector3::zeros(), r: Matrix3::identity() };
         let zero = JointVector::zeros();
         let tool = TaskFrame::new(&base).kinematics(&arm::tip_motion(&model, &zero, &zero));
         let limits = LimitTask::none();

@@ -56,10 +56,7 @@ pub struct Safety {
 impl Safety {
     /// Running.
     pub fn new() -> Safety {
-        Safety {
-            state: State::Run,
-            since: 0,
-        }
+        Safety { state: State::Run, since: 0 }
     }
 
     /// State now.
@@ -76,9 +73,7 @@ impl Safety {
             match self.state {
                 State::Off if signs.acknowledge => State::Run,
                 State::Off => State::Off,
-                State::Stop if signs.speed < AT_REST || now >= self.since + STOP_TIME_NS => {
-                    State::Off
-                }
+                State::Stop if signs.speed < AT_REST || now >= self.since + STOP_TIME_NS => State::Off,
                 State::Stop => State::Stop,
                 _ if signs.held_jobs > MAX_HELD_JOBS => State::Stop,
                 State::Hold if !signs.acknowledge => State::Hold,
@@ -88,10 +83,7 @@ impl Safety {
             }
         };
         if next != self.state {
-            *self = Safety {
-                state: next,
-                since: now,
-            };
+            *self = Safety { state: next, since: now };
         }
         next
     }
@@ -107,43 +99,21 @@ impl Default for Safety {
 mod tests {
     use super::*;
 
-    const FINE: Signs = Signs {
-        drive_status: 0,
-        held_jobs: 0,
-        speed: 1.0,
-        finite: true,
-        hold: false,
-        acknowledge: false,
-    };
+    const FINE: Signs =
+        Signs { drive_status: 0, held_jobs: 0, speed: 1.0, finite: true, hold: false, acknowledge: false };
 
     #[test]
     fn a_trip_or_an_emergency_stop_takes_the_torque_off_from_any_state_until_acknowledged() {
         for bit in [1, 1 << 6, drive_status::EMERGENCY_STOP] {
-            let trip = Signs {
-                drive_status: bit,
-                ..FINE
-            };
-            for before in [
-                FINE,
-                Signs { hold: true, ..FINE },
-                Signs {
-                    held_jobs: 9,
-                    ..FINE
-                },
-            ] {
+            let trip = Signs { drive_status: bit, ..FINE };
+            for before in [FINE, Signs { hold: true, ..FINE }, Signs { held_jobs: 9, ..FINE }] {
                 let mut safety = Safety::new();
                 safety.decide(1, &before);
                 assert_eq!(safety.decide(2, &trip), State::Off);
                 assert_eq!(safety.decide(3, &FINE), State::Off);
-                let too_early = Signs {
-                    acknowledge: true,
-                    ..trip
-                };
+                let too_early = Signs { acknowledge: true, ..trip };
                 assert_eq!(safety.decide(4, &too_early), State::Off);
-                let in_time = Signs {
-                    acknowledge: true,
-                    ..FINE
-                };
+                let in_time = Signs { acknowledge: true, ..FINE };
                 assert_eq!(safety.decide(5, &in_time), State::Run);
             }
         }
@@ -151,20 +121,14 @@ mod tests {
 
     #[test]
     fn a_limit_switch_and_an_engaged_brake_are_no_trip() {
-        let signs = Signs {
-            drive_status: drive_status::LIMIT_SWITCH | drive_status::BRAKE_ENGAGED,
-            ..FINE
-        };
+        let signs = Signs { drive_status: drive_status::LIMIT_SWITCH | drive_status::BRAKE_ENGAGED, ..FINE };
         assert_eq!(Safety::new().decide(1, &signs), State::Run);
     }
 
     #[test]
     fn a_missing_value_degrades_then_stops_and_the_stop_ends_in_torque_off() {
         let mut safety = Safety::new();
-        let held = |jobs| Signs {
-            held_jobs: jobs,
-            ..FINE
-        };
+        let held = |jobs| Signs { held_jobs: jobs, ..FINE };
         for jobs in 1..=MAX_HELD_JOBS {
             assert_eq!(safety.decide(u64::from(jobs), &held(jobs)), State::Degraded);
         }
@@ -172,16 +136,7 @@ mod tests {
         assert_eq!(safety.decide(5, &held(MAX_HELD_JOBS + 1)), State::Stop);
         assert_eq!(safety.decide(6, &FINE), State::Stop, "SS1 is not left");
         let mut slow = safety;
-        assert_eq!(
-            slow.decide(
-                7,
-                &Signs {
-                    speed: 1e-3,
-                    ..FINE
-                }
-            ),
-            State::Off
-        );
+        assert_eq!(slow.decide(7, &Signs { speed: 1e-3, ..FINE }), State::Off);
         assert_eq!(safety.decide(5 + STOP_TIME_NS, &FINE), State::Off);
     }
 
@@ -190,19 +145,13 @@ mod tests {
         let mut safety = Safety::new();
         assert_eq!(safety.decide(1, &Signs { hold: true, ..FINE }), State::Hold);
         assert_eq!(safety.decide(2, &FINE), State::Hold);
-        let acknowledged = Signs {
-            acknowledge: true,
-            ..FINE
-        };
+        let acknowledged = Signs { acknowledge: true, ..FINE };
         assert_eq!(safety.decide(3, &acknowledged), State::Run);
     }
 
     #[test]
     fn torques_that_are_no_numbers_take_the_torque_off() {
-        let signs = Signs {
-            finite: false,
-            ..FINE
-        };
+        let signs = Signs { finite: false, ..FINE };
         assert_eq!(Safety::new().decide(1, &signs), State::Off);
     }
 }

@@ -12,11 +12,9 @@ use scenario::{ForceFilter, Scenario};
 use vme::Ns;
 
 /// Errors of the receiver under which its force words mean nothing.
-const FORCE_INVALID: u32 = (force::ERROR_MEMORY
-    | force::ERROR_SENSOR_CHANGE
-    | force::ERROR_BUSY
-    | force::ERROR_CRC
-    | force::ERROR_WATCHDOG) as u32;
+const FORCE_INVALID: u32 =
+    (force::ERROR_MEMORY | force::ERROR_SENSOR_CHANGE | force::ERROR_BUSY | force::ERROR_CRC | force::ERROR_WATCHDOG)
+        as u32;
 
 /// Bits of the six force words among those that came.
 const FORCE_WORDS: u32 = 0x3F << FORCES;
@@ -66,22 +64,10 @@ impl Sensors {
             ForceFilter::Cascade(n) => 125_000 << (2 * u32::from(n)),
             ForceFilter::DelayMs(_) => 125_000,
         };
-        let full_scale = Spatial::from_fn(|axis, _| {
-            if axis < 3 {
-                receiver.full_scale_n
-            } else {
-                receiver.full_scale_nm
-            }
-        });
+        let full_scale =
+            Spatial::from_fn(|axis, _| if axis < 3 { receiver.full_scale_n } else { receiver.full_scale_nm });
         Ok(Sensors {
-            words: [BusWord {
-                t: 0,
-                addr: 0,
-                value: 0,
-                job: 0,
-                task: 0,
-                index: 0,
-            }; READS],
+            words: [BusWord { t: 0, addr: 0, value: 0, job: 0, task: 0, index: 0 }; READS],
             came: 0,
             job: 0,
             held: [0; READS],
@@ -89,11 +75,7 @@ impl Sensors {
             counts_at: [0; JOINTS],
             counter_bits: scenario.encoder_if.counter_bits.into(),
             counts_per_rad,
-            sensed: Sensed {
-                q: posture,
-                qd: JointVector::zeros(),
-                wrench: Spatial::zeros(),
-            },
+            sensed: Sensed { q: posture, qd: JointVector::zeros(), wrench: Spatial::zeros() },
             force_scale: full_scale / receiver.full_scale_counts,
             wide_force: is_wide(scenario),
             force_period_ns,
@@ -125,11 +107,7 @@ impl Sensors {
         }
         let mut failed = None;
         for index in 0..READS {
-            self.held[index] = if self.has(index) {
-                0
-            } else {
-                self.held[index] + 1
-            };
+            self.held[index] = if self.has(index) { 0 } else { self.held[index] + 1 };
             if failed.is_none() && came & (1 << index) == 0 && self.held[index] == 1 {
                 failed = Some(index);
             }
@@ -197,11 +175,7 @@ impl Sensors {
             let at = FORCES + axis;
             if self.has(at) {
                 let value = self.words[at].value;
-                let counts = if self.wide_force {
-                    f64::from(value as i32)
-                } else {
-                    f64::from(value as u16 as i16)
-                };
+                let counts = if self.wide_force { f64::from(value as i32) } else { f64::from(value as u16 as i16) };
                 self.sensed.wrench[axis] = counts * self.force_scale[axis];
             }
         }
@@ -220,21 +194,11 @@ mod tests {
 
     fn scenario(overrides: &[&str]) -> Scenario {
         let overrides: Vec<String> = overrides.iter().map(|o| o.to_string()).collect();
-        scenario::load("table-5-3", &overrides)
-            .unwrap()
-            .scenario()
-            .unwrap()
+        scenario::load("table-5-3", &overrides).unwrap().scenario().unwrap()
     }
 
     fn word(job: u32, index: usize, value: u32, t: Ns) -> BusWord {
-        BusWord {
-            t,
-            addr: 0,
-            value,
-            job,
-            task: 0,
-            index: index as u16,
-        }
+        BusWord { t, addr: 0, value, job, task: 0, index: index as u16 }
     }
 
     /// All words of a job: these counts, zero elsewhere.
@@ -262,8 +226,8 @@ mod tests {
             counts = counts.map(|count| count + way);
             give(&mut sensors, job, counts, 1000);
             assert_eq!(sensors.read(job), None);
-            for joint in 0..JOINTS {
-                let q = counts[joint] as f64 / sensors.counts_per_rad[joint];
+            for (joint, &count) in counts.iter().enumerate() {
+                let q = count as f64 / sensors.counts_per_rad[joint];
                 assert_eq!(sensors.sensed().q[joint], q);
             }
         }
@@ -295,17 +259,9 @@ mod tests {
         let before = *sensors.sensed();
         for job in 1..=3 {
             for index in (0..READS).filter(|&index| index != COUNTS + 4) {
-                let value = if index == STATUS {
-                    1
-                } else {
-                    (counts[index.min(13) / 2] + 10) as u32
-                };
-                let value = if (FORCES..STATUS).contains(&index) || index % 2 == 1 && index < FORCES
-                {
-                    0
-                } else {
-                    value
-                };
+                let value = if index == STATUS { 1 } else { (counts[index.min(13) / 2] + 10) as u32 };
+                let value =
+                    if (FORCES..STATUS).contains(&index) || index % 2 == 1 && index < FORCES { 0 } else { value };
                 sensors.take(&word(job, index, value, 0));
             }
             // only the first miss in a row is news
@@ -342,15 +298,10 @@ mod tests {
     #[test]
     fn the_age_of_a_force_sample_follows_from_its_counter_across_its_wrap() {
         // filter 4 publishes every 32 ms; its counter wraps after 2097 s
-        let mut sensors =
-            Sensors::new(&scenario(&["force_sensor_if.filter={ cascade = 4 }"])).unwrap();
+        let mut sensors = Sensors::new(&scenario(&["force_sensor_if.filter={ cascade = 4 }"])).unwrap();
         let counts = sensors.counts;
-        for (job, (t, published)) in [
-            (70_000_000, 64_000_000),
-            (2_097_200_000_000, 2_097_184_000_000),
-        ]
-        .into_iter()
-        .enumerate()
+        for (job, (t, published)) in
+            [(70_000_000, 64_000_000), (2_097_200_000_000, 2_097_184_000_000)].into_iter().enumerate()
         {
             give(&mut sensors, job as u32, counts, t);
             let counter = (published / 32_000_000) as u16;

@@ -33,10 +33,7 @@ pub struct Bounds {
 impl Target {
     /// At rest in a pose.
     pub fn at_rest(pose: Pose) -> Target {
-        Target {
-            pose,
-            twist: Spatial::zeros(),
-        }
+        Target { pose, twist: Spatial::zeros() }
     }
 
     /// Carries the target over a period of `dt` seconds at constant Ẍᵗ.
@@ -99,10 +96,7 @@ mod tests {
     use nalgebra::Vector3;
 
     fn origin() -> Pose {
-        Pose {
-            p: Vector3::zeros(),
-            r: Matrix3::identity(),
-        }
+        Pose { p: Vector3::zeros(), r: Matrix3::identity() }
     }
 
     fn impedance(mass: f64, damping: f64, stiffness: f64) -> Impedance {
@@ -127,21 +121,14 @@ mod tests {
         let (m, b, k, x0) = (112.0, 700.0, 1100.0, 0.13);
         let law = impedance(m, b, k);
         let xd = Motion::at_rest(origin());
-        let start = Pose {
-            p: Vector3::new(0.0, 0.0, x0),
-            r: rotation::exp(&Vector3::new(x0, 0.0, 0.0)),
-        };
+        let start = Pose { p: Vector3::new(0.0, 0.0, x0), r: rotation::exp(&Vector3::new(x0, 0.0, 0.0)) };
         let mut target = Target::at_rest(start);
         let mut worst = (0.0f64, 0.0f64);
         for step in 0..(5.0 / dt) as u32 {
             let x = ideal(m, b, k, x0, f64::from(step) * dt);
             let error = difference(&target.pose, &xd.pose);
-            worst = (
-                worst.0.max((error[2] - x).abs()),
-                worst.1.max((error[3] - x).abs()),
-            );
-            let xt_ddot =
-                target_acceleration(&law, &xd, &target.pose, &target.twist, &Spatial::zeros());
+            worst = (worst.0.max((error[2] - x).abs()), worst.1.max((error[3] - x).abs()));
+            let xt_ddot = target_acceleration(&law, &xd, &target.pose, &target.twist, &Spatial::zeros());
             target.advance(&xt_ddot, dt);
         }
         worst
@@ -168,15 +155,9 @@ mod tests {
 
     #[test]
     fn the_limit_stops_the_target_and_lets_it_come_back() {
-        let bounds = Bounds {
-            linear: [0.1; 3],
-            angular: 0.2,
-        };
+        let bounds = Bounds { linear: [0.1; 3], angular: 0.2 };
         let mut target = Target {
-            pose: Pose {
-                p: Vector3::new(0.3, -0.05, -0.3),
-                r: rotation::exp(&Vector3::new(0.0, 0.0, 0.5)),
-            },
+            pose: Pose { p: Vector3::new(0.3, -0.05, -0.3), r: rotation::exp(&Vector3::new(0.0, 0.0, 0.5)) },
             twist: Spatial::new(1.0, 1.0, 1.0, 0.3, 0.0, 0.7),
         };
         let acted = target.limit(&origin(), &Spatial::zeros(), &bounds);
@@ -188,14 +169,7 @@ mod tests {
         let back = rotation::log(&target.pose.r);
         assert!((back - Vector3::new(0.0, 0.0, 0.2)).amax() < 1e-12);
         assert_eq!(
-            target.limit(
-                &target.pose.clone(),
-                &Spatial::zeros(),
-                &Bounds {
-                    linear: [0.0; 3],
-                    angular: 1e-9
-                }
-            ),
+            target.limit(&target.pose.clone(), &Spatial::zeros(), &Bounds { linear: [0.0; 3], angular: 1e-9 }),
             0
         );
     }

@@ -65,26 +65,14 @@ impl ToolCompensation {
             inertia,
             sensor,
             gravity: frame.vector(gravity),
-            tare: Tare {
-                until: tare_until,
-                sum: Spatial::zeros(),
-                n: 0,
-                offset: Spatial::zeros(),
-            },
+            tare: Tare { until: tare_until, sum: Spatial::zeros(), n: 0, offset: Spatial::zeros() },
             last_twist: None,
         }
     }
 
     /// F_e from the wrench measured (sensor axes) with the tool at `x`, moving with `x_dot` (C), at `now`, `dt` seconds
     /// after the last call.
-    pub fn contact(
-        &mut self,
-        measured: &Spatial,
-        x: &Pose,
-        x_dot: &Spatial,
-        now: Ns,
-        dt: f64,
-    ) -> Contact {
+    pub fn contact(&mut self, measured: &Spatial, x: &Pose, x_dot: &Spatial, now: Ns, dt: f64) -> Contact {
         let own = self.own_wrench(x, x_dot, dt);
         self.last_twist = Some(*x_dot);
         let mut wrench = measured - own;
@@ -93,10 +81,7 @@ impl ToolCompensation {
             self.tare.sum += wrench;
             self.tare.n += 1;
             if now < until {
-                return Contact {
-                    fe: Spatial::zeros(),
-                    tared,
-                };
+                return Contact { fe: Spatial::zeros(), tared };
             }
             self.tare.until = None;
             self.tare.offset = self.tare.sum / f64::from(self.tare.n);
@@ -105,10 +90,7 @@ impl ToolCompensation {
         wrench -= self.tare.offset;
         let force = linear(&wrench);
         let moment = angular(&wrench) + self.sensor.cross(&force);
-        Contact {
-            fe: spatial(x.r * force, x.r * moment),
-            tared,
-        }
+        Contact { fe: spatial(x.r * force, x.r * moment), tared }
     }
 
     /// What the tool itself makes the sensor show: m (a − g) at its centre of mass, sensor axes.
@@ -137,10 +119,7 @@ mod tests {
     const DT: f64 = 5e-3;
 
     fn frame() -> TaskFrame {
-        TaskFrame::new(&Pose {
-            p: Vector3::new(0.6, 0.0, 0.9),
-            r: rotation::from_rpy(std::f64::consts::PI, 0.0, 0.0),
-        })
+        TaskFrame::new(&Pose { p: Vector3::new(0.6, 0.0, 0.9), r: rotation::from_rpy(std::f64::consts::PI, 0.0, 0.0) })
     }
 
     fn compensation(inertia: bool, tare_until: Option<Ns>) -> ToolCompensation {
@@ -155,36 +134,20 @@ mod tests {
     }
 
     /// What the flange exerts on a tool with these accelerations (base axes) and this contact wrench about the tool point.
-    fn gauges(
-        r: &Matrix3<f64>,
-        a_com: Vector3<f64>,
-        force: Vector3<f64>,
-        moment: Vector3<f64>,
-    ) -> Spatial {
+    fn gauges(r: &Matrix3<f64>, a_com: Vector3<f64>, force: Vector3<f64>, moment: Vector3<f64>) -> Spatial {
         let (com, tool_point) = (Vector3::new(0.01, -0.02, 0.05), Vector3::new(0.0, 0.0, 0.1));
         let own = r.transpose() * (a_com - Vector3::new(0.0, 0.0, -9.81)) * 0.8;
         let f = r.transpose() * force;
-        spatial(
-            own + f,
-            com.cross(&own) + tool_point.cross(&f) + r.transpose() * moment,
-        )
+        spatial(own + f, com.cross(&own) + tool_point.cross(&f) + r.transpose() * moment)
     }
 
     fn postures() -> Vec<Matrix3<f64>> {
-        let angles = [
-            [0.0, 0.0, 0.0],
-            [3.1, 0.2, 1.0],
-            [-1.2, 0.9, 2.0],
-            [1.5, -1.4, -2.5],
-        ];
+        let angles = [[0.0, 0.0, 0.0], [3.1, 0.2, 1.0], [-1.2, 0.9, 2.0], [1.5, -1.4, -2.5]];
         angles.map(|[r, p, y]| rotation::from_rpy(r, p, y)).to_vec()
     }
 
     fn pose_in_c(r: &Matrix3<f64>) -> Pose {
-        frame().pose(&Pose {
-            p: Vector3::zeros(),
-            r: *r,
-        })
+        frame().pose(&Pose { p: Vector3::zeros(), r: *r })
     }
 
     #[test]
@@ -192,8 +155,7 @@ mod tests {
         for r in postures() {
             let measured = gauges(&r, Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
             let rest = Spatial::zeros();
-            let contact =
-                compensation(false, None).contact(&measured, &pose_in_c(&r), &rest, 0, DT);
+            let contact = compensation(false, None).contact(&measured, &pose_in_c(&r), &rest, 0, DT);
             assert!(contact.fe.amax() < 1e-12, "{}", contact.fe);
         }
     }
@@ -204,8 +166,7 @@ mod tests {
         for r in postures() {
             let measured = gauges(&r, Vector3::zeros(), force, moment);
             let rest = Spatial::zeros();
-            let contact =
-                compensation(false, None).contact(&measured, &pose_in_c(&r), &rest, 0, DT);
+            let contact = compensation(false, None).contact(&measured, &pose_in_c(&r), &rest, 0, DT);
             // C looks down: y and z change sign; pushing down is F_z > 0
             let expected = Spatial::new(3.0, 4.0, 60.0, 0.5, -0.2, 0.1);
             assert!((contact.fe - expected).amax() < 1e-12, "{}", contact.fe);
@@ -226,9 +187,7 @@ mod tests {
         with.contact(&measured, &x, &twist(0.5 - DT), 0, DT);
         let fe = with.contact(&measured, &x, &twist(0.5), 0, DT).fe;
         assert!(fe.amax() < 1e-9, "{fe}");
-        let without = compensation(false, None)
-            .contact(&measured, &x, &twist(0.5), 0, DT)
-            .fe;
+        let without = compensation(false, None).contact(&measured, &x, &twist(0.5), 0, DT).fe;
         assert!((without[1] + 0.8 * frame().vector(&(-a))[1]).abs() < 1e-9);
     }
 
@@ -239,20 +198,14 @@ mod tests {
         let rest = Spatial::zeros();
         for (i, r) in postures().iter().cycle().take(4).enumerate() {
             let measured = gauges(r, Vector3::zeros(), Vector3::zeros(), Vector3::zeros()) + offset;
-            let contact =
-                compensation.contact(&measured, &pose_in_c(r), &rest, 5_000_000 * i as u64, DT);
+            let contact = compensation.contact(&measured, &pose_in_c(r), &rest, 5_000_000 * i as u64, DT);
             assert_eq!((contact.fe, contact.tared), (Spatial::zeros(), None));
         }
         let r = postures()[2];
         let pushed = gauges(&r, Vector3::zeros(), Vector3::zeros(), Vector3::zeros()) + offset;
         let contact = compensation.contact(&pushed, &pose_in_c(&r), &rest, 20_000_000, DT);
         assert!((contact.tared.unwrap() - offset).amax() < 1e-12);
-        let pushed = gauges(
-            &r,
-            Vector3::zeros(),
-            Vector3::new(0.0, 0.0, -7.0),
-            Vector3::zeros(),
-        ) + offset;
+        let pushed = gauges(&r, Vector3::zeros(), Vector3::new(0.0, 0.0, -7.0), Vector3::zeros()) + offset;
         let contact = compensation.contact(&pushed, &pose_in_c(&r), &rest, 25_000_000, DT);
         assert!((contact.fe - Spatial::new(0.0, 0.0, 7.0, 0.0, 0.0, 0.0)).amax() < 1e-12);
         assert_eq!(contact.tared, None);

@@ -47,14 +47,7 @@ pub struct Trajectory {
 impl Trajectory {
     /// X_d rests at `pose` under `impedance` until the first segment starts.
     pub fn new(pose: Pose, impedance: Impedance) -> Trajectory {
-        Trajectory {
-            impedance,
-            from: pose,
-            active: None,
-            queue: [None; QUEUE],
-            first: 0,
-            waiting: 0,
-        }
+        Trajectory { impedance, from: pose, active: None, queue: [None; QUEUE], first: 0, waiting: 0 }
     }
 
     /// X_d rests at `pose` under `impedance` until the next segment starts.
@@ -176,18 +169,10 @@ fn blended(u: f64) -> TimeLaw {
     if u < BLEND {
         rising(u)
     } else if u <= 1.0 - BLEND {
-        TimeLaw {
-            s: speed * (u - 0.5 * BLEND),
-            speed,
-            acceleration: 0.0,
-        }
+        TimeLaw { s: speed * (u - 0.5 * BLEND), speed, acceleration: 0.0 }
     } else {
         let mirrored = rising(1.0 - u);
-        TimeLaw {
-            s: 1.0 - mirrored.s,
-            speed: mirrored.speed,
-            acceleration: -mirrored.acceleration,
-        }
+        TimeLaw { s: 1.0 - mirrored.s, speed: mirrored.speed, acceleration: -mirrored.acceleration }
     }
 }
 
@@ -210,28 +195,15 @@ mod tests {
     }
 
     fn start() -> Pose {
-        Pose {
-            p: Vector3::new(0.1, 0.0, -0.2),
-            r: Matrix3::identity(),
-        }
+        Pose { p: Vector3::new(0.1, 0.0, -0.2), r: Matrix3::identity() }
     }
 
     fn target() -> Pose {
-        Pose {
-            p: Vector3::new(0.4, -0.1, 0.2),
-            r: rotation::exp(&Vector3::new(0.3, 1.2, -0.4)),
-        }
+        Pose { p: Vector3::new(0.4, -0.1, 0.2), r: rotation::exp(&Vector3::new(0.3, 1.2, -0.4)) }
     }
 
     fn segment(index: u32, start: Ns, path: PathKind, target: Pose) -> Segment {
-        Segment {
-            index,
-            start,
-            move_time: 2 * SECOND,
-            path,
-            target,
-            impedance: impedance(f64::from(index) + 1.0),
-        }
+        Segment { index, start, move_time: 2 * SECOND, path, target, impedance: impedance(f64::from(index) + 1.0) }
     }
 
     fn moving(path: PathKind) -> Trajectory {
@@ -245,17 +217,10 @@ mod tests {
     fn paths_begin_and_end_at_rest_in_the_poses_asked_for() {
         for path in [PathKind::PointToPoint, PathKind::Line] {
             let trajectory = moving(path);
-            for (at, pose) in [
-                (SECOND, start()),
-                (3 * SECOND, target()),
-                (9 * SECOND, target()),
-            ] {
+            for (at, pose) in [(SECOND, start()), (3 * SECOND, target()), (9 * SECOND, target())] {
                 let x = trajectory.desired(at);
                 assert!(difference(&x.pose, &pose).amax() < 1e-12);
-                assert!(
-                    x.twist.amax() < 1e-12 && x.acceleration.amax() < 1e-12,
-                    "{path:?} {at}"
-                );
+                assert!(x.twist.amax() < 1e-12 && x.acceleration.amax() < 1e-12, "{path:?} {at}");
             }
         }
     }
@@ -267,23 +232,12 @@ mod tests {
             let h = 1_000_000;
             for k in 1..200 {
                 let t = SECOND + k * 10_000_000;
-                let (before, x, after) = (
-                    trajectory.desired(t - h),
-                    trajectory.desired(t),
-                    trajectory.desired(t + h),
-                );
+                let (before, x, after) = (trajectory.desired(t - h), trajectory.desired(t), trajectory.desired(t + h));
                 let dt = h as f64 * 1e-9;
                 let speed = difference(&after.pose, &before.pose) / (2.0 * dt);
-                assert!(
-                    (speed - x.twist).amax() < 1e-4,
-                    "{path:?} {k}: {speed} {}",
-                    x.twist
-                );
+                assert!((speed - x.twist).amax() < 1e-4, "{path:?} {k}: {speed} {}", x.twist);
                 let acceleration = (after.twist - before.twist) / (2.0 * dt);
-                assert!(
-                    (acceleration - x.acceleration).amax() < 1e-3,
-                    "{path:?} {k}"
-                );
+                assert!((acceleration - x.acceleration).amax() < 1e-3, "{path:?} {k}");
             }
         }
     }
@@ -302,14 +256,8 @@ mod tests {
 
     #[test]
     fn hold_stays_and_step_jumps() {
-        assert_eq!(
-            moving(PathKind::Hold).desired(5 * SECOND),
-            Motion::at_rest(start())
-        );
-        assert_eq!(
-            moving(PathKind::Step).desired(SECOND),
-            Motion::at_rest(target())
-        );
+        assert_eq!(moving(PathKind::Hold).desired(5 * SECOND), Motion::at_rest(start()));
+        assert_eq!(moving(PathKind::Step).desired(SECOND), Motion::at_rest(target()));
     }
 
     #[test]
@@ -319,17 +267,11 @@ mod tests {
         trajectory.push(segment(1, 2 * SECOND, PathKind::PointToPoint, start()));
         assert_eq!(trajectory.last_start(), 2 * SECOND);
         assert_eq!(trajectory.start_due(SECOND - 1), None);
-        assert_eq!(
-            (trajectory.segment(), trajectory.impedance().mass[0]),
-            (None, 9.0)
-        );
+        assert_eq!((trajectory.segment(), trajectory.impedance().mass[0]), (None, 9.0));
         assert_eq!(trajectory.start_due(SECOND + 5), Some(0));
         let half_way = trajectory.desired(2 * SECOND).pose;
         assert_eq!(trajectory.start_due(2 * SECOND + 5), Some(1));
-        assert_eq!(
-            (trajectory.segment(), trajectory.impedance().mass[0]),
-            (Some(1), 2.0)
-        );
+        assert_eq!((trajectory.segment(), trajectory.impedance().mass[0]), (Some(1), 2.0));
         assert_eq!(trajectory.desired(2 * SECOND).pose, half_way);
     }
 

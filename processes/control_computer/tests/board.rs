@@ -32,19 +32,9 @@ fn the_program_reads_every_sensor_register_once_and_then_decides() {
 fn the_first_job_enables_the_amplifiers_and_lets_go_of_the_brakes_once() {
     let mut rig = Rig::new(table_5_3());
     rig.run();
-    let (enable, brake) = (
-        rig.address("parallel-io", parallel::ENABLE),
-        rig.address("parallel-io", parallel::BRAKE),
-    );
-    assert_eq!(
-        (rig.written(enable), rig.written(brake)),
-        (Some(0x7F), Some(0x7F))
-    );
-    assert_eq!(
-        rig.writes().last().unwrap().0,
-        brake,
-        "torque stands before the brakes let go"
-    );
+    let (enable, brake) = (rig.address("parallel-io", parallel::ENABLE), rig.address("parallel-io", parallel::BRAKE));
+    assert_eq!((rig.written(enable), rig.written(brake)), (Some(0x7F), Some(0x7F)));
+    assert_eq!(rig.writes().last().unwrap().0, brake, "torque stands before the brakes let go");
     assert_eq!(rig.rest[0], Op::Exec(1_500_000));
     rig.run();
     assert_eq!((rig.written(enable), rig.written(brake)), (None, None));
@@ -52,10 +42,7 @@ fn the_first_job_enables_the_amplifiers_and_lets_go_of_the_brakes_once() {
     for job in 2..5 {
         rig.run();
         assert_eq!(rig.rest, rest);
-        assert_eq!(
-            rig.written(rig.address("parallel-io", parallel::WATCHDOG)),
-            Some(job)
-        );
+        assert_eq!(rig.written(rig.address("parallel-io", parallel::WATCHDOG)), Some(job));
     }
 }
 
@@ -75,19 +62,11 @@ fn an_arm_at_rest_in_its_posture_gets_the_torques_that_carry_it() {
     let (writes, gravity) = (rig.writes(), arm::gravity_torque(&arm, &q));
     for joint in 0..7 {
         let card = format!("da-{}", joint / 4 + 1);
-        let code = writes
-            .iter()
-            .find(|w| w.0 == rig.address(&card, da::code(joint as u32 % 4)))
-            .unwrap()
-            .1;
+        let code = writes.iter().find(|w| w.0 == rig.address(&card, da::code(joint as u32 % 4))).unwrap().1;
         let gain = drives.joints[joint].amplifier_nm_per_v;
         let torque = (f64::from(code) - 2048.0) * 20.0 / 4096.0 * gain;
         assert!((torque - probe.torque[joint]).abs() <= 0.5 * gain * 20.0 / 4096.0 + 1e-9);
-        assert!(
-            (probe.torque[joint] - gravity[joint]).abs() < 0.01,
-            "{joint}: {}",
-            gravity[joint]
-        );
+        assert!((probe.torque[joint] - gravity[joint]).abs() < 0.01, "{joint}: {}", gravity[joint]);
     }
 }
 
@@ -95,25 +74,15 @@ fn an_arm_at_rest_in_its_posture_gets_the_torques_that_carry_it() {
 fn a_command_counts_from_its_transfer_on_and_is_judged_once() {
     let mut rig = Rig::new(table_5_3());
     rig.run();
-    rig.inputs
-        .mail
-        .commands
-        .push(command(1, CommandKind::Segment));
+    rig.inputs.mail.commands.push(command(1, CommandKind::Segment));
     rig.run();
-    assert_eq!(
-        rig.out.mail.control_probe[0].segment,
-        u32::MAX,
-        "posted, but not transferred"
-    );
+    assert_eq!(rig.out.mail.control_probe[0].segment, u32::MAX, "posted, but not transferred");
     let n = size_of::<messages::Command>() as u32 / 4;
     rig.transfer(mailbox::COMMAND, n, 1, 0, rig.now() - 10);
     rig.run();
     assert_eq!(rig.out.mail.control_probe[0].segment, 0);
     let start = rig.events(EventKind::SegmentStart);
-    assert_eq!(
-        (start.len(), start[0].a, start[0].t),
-        (1, 0.0, rig.now() - PERIOD)
-    );
+    assert_eq!((start.len(), start[0].a, start[0].t), (1, 0.0, rig.now() - PERIOD));
 
     rig.command(command(1, CommandKind::Segment), 0);
     rig.run();
@@ -162,11 +131,7 @@ fn a_telemetry_read_shows_the_last_job_that_had_ended_by_then() {
     }
     // job 3 decided at 3 T + DECISION and writes its block 1.5 ms later
     let decided = 3 * PERIOD + DECISION;
-    for (at, heartbeat) in [
-        (decided + 1_000_000, 2),
-        (decided + 1_500_000, 3),
-        (decided + 4_000_000, 3),
-    ] {
+    for (at, heartbeat) in [(decided + 1_000_000, 2), (decided + 1_500_000, 3), (decided + 4_000_000, 3)] {
         rig.transfer(mailbox::TELEMETRY, 26, 0, 0, at);
         let shown = heartbeat;
         rig.out.clear();
@@ -175,10 +140,7 @@ fn a_telemetry_read_shows_the_last_job_that_had_ended_by_then() {
         rig.inputs.transfers.clear();
         let telemetry = rig.out.mail.telemetry[0];
         assert_eq!((telemetry.heartbeat, telemetry.t), (shown, at));
-        assert_eq!(
-            telemetry.written,
-            u64::from(shown) * PERIOD + DECISION + 1_500_000
-        );
+        assert_eq!(telemetry.written, u64::from(shown) * PERIOD + DECISION + 1_500_000);
     }
 }
 
@@ -195,15 +157,9 @@ fn an_emergency_stop_takes_the_torque_off_in_the_job_that_sees_it() {
     assert_eq!(writes[0], (rig.address("parallel-io", parallel::ENABLE), 0));
     assert_eq!(writes[1], (rig.address("parallel-io", parallel::BRAKE), 0));
     for joint in 0..4 {
-        assert_eq!(
-            rig.written(rig.address("da-1", da::code(joint))),
-            Some(2048)
-        );
+        assert_eq!(rig.written(rig.address("da-1", da::code(joint))), Some(2048));
     }
-    assert!(
-        matches!(rig.rest[0], Op::Exec(ns) if ns <= 50_000),
-        "nothing is computed before a stop"
-    );
+    assert!(matches!(rig.rest[0], Op::Exec(ns) if ns <= 50_000), "nothing is computed before a stop");
     let event = rig.events(EventKind::SafetyState)[0];
     assert_eq!((event.a, event.b), (0.0, 4.0));
 
@@ -216,10 +172,7 @@ fn an_emergency_stop_takes_the_torque_off_in_the_job_that_sees_it() {
     rig.command(command(2, CommandKind::Acknowledge), 0);
     rig.run();
     assert_eq!(state(&rig), 0);
-    assert_eq!(
-        rig.written(rig.address("parallel-io", parallel::ENABLE)),
-        Some(0x7F)
-    );
+    assert_eq!(rig.written(rig.address("parallel-io", parallel::ENABLE)), Some(0x7F));
 }
 
 #[test]
@@ -236,10 +189,7 @@ fn a_card_that_does_not_answer_is_bridged_then_stops_the_arm() {
         let errors = rig.events(EventKind::BusError);
         assert_eq!(errors.len(), usize::from(job == 0));
         if job == 0 {
-            assert_eq!(
-                (errors[0].a, errors[0].b),
-                (3.0, f64::from(rig.reads[4].addr))
-            );
+            assert_eq!((errors[0].a, errors[0].b), (3.0, f64::from(rig.reads[4].addr)));
         }
     }
     // an arm at rest has nothing to decelerate: SS1 ends at once

@@ -15,10 +15,7 @@ pub const PERIOD: Ns = 5_000_000;
 pub const DECISION: Ns = 180_000;
 
 pub fn table_5_3() -> Scenario {
-    scenario::load("table-5-3", &[])
-        .unwrap()
-        .scenario()
-        .unwrap()
+    scenario::load("table-5-3", &[]).unwrap().scenario().unwrap()
 }
 
 pub struct Rig {
@@ -40,30 +37,16 @@ pub struct Rig {
 impl Rig {
     pub fn new(scenario: Scenario) -> Rig {
         let mut board = ControlComputer::new(&scenario).unwrap();
-        let drives = scenario
-            .drives()
-            .unwrap()
-            .each(|drive| drive.counts_per_rad());
+        let drives = scenario.drives().unwrap().each(|drive| drive.counts_per_rad());
         let posture = scenario.initial_posture().unwrap();
-        let mut inputs = Inputs {
-            boot: true,
-            ..Inputs::default()
-        };
+        let mut inputs = Inputs { boot: true, ..Inputs::default() };
         let mut out = Outputs::default();
         board.step(0, &inputs, &mut out);
         inputs.boot = false;
         let (task, program) = out.program.take().unwrap();
         assert_eq!(Some(task), scenario.task_of("control_computer"));
-        let reads = program
-            .iter()
-            .filter_map(|op| {
-                if let Op::Access(access) = op {
-                    Some(*access)
-                } else {
-                    None
-                }
-            })
-            .collect();
+        let reads =
+            program.iter().filter_map(|op| if let Op::Access(access) = op { Some(*access) } else { None }).collect();
         assert_eq!(program.last(), Some(&Op::Decide));
         Rig {
             counts: std::array::from_fn(|i| (posture[i] * drives[i]).floor() as i32),
@@ -132,16 +115,12 @@ impl Rig {
         }
         self.inputs.from = self.inputs.until;
         self.inputs.until = now;
-        self.inputs.decision = Some(board::Decision {
-            task: self.task(),
-            job: self.job,
-        });
+        self.inputs.decision = Some(board::Decision { task: self.task(), job: self.job });
     }
 
     /// The board's step alone.
     pub fn step(&mut self) {
-        self.board
-            .step(self.inputs.until, &self.inputs, &mut self.out);
+        self.board.step(self.inputs.until, &self.inputs, &mut self.out);
     }
 
     /// Takes over what the job gave.
@@ -157,17 +136,8 @@ impl Rig {
 
     /// What the last job wrote, with the accesses that carry it.
     pub fn writes(&self) -> Vec<(u32, u32)> {
-        let accesses: Vec<Access> = self
-            .rest
-            .iter()
-            .filter_map(|op| {
-                if let Op::Access(access) = op {
-                    Some(*access)
-                } else {
-                    None
-                }
-            })
-            .collect();
+        let accesses: Vec<Access> =
+            self.rest.iter().filter_map(|op| if let Op::Access(access) = op { Some(*access) } else { None }).collect();
         let words = &self.out.mail.words;
         assert_eq!(words.len(), accesses.len());
         for (i, (word, access)) in words.iter().zip(&accesses).enumerate() {
@@ -179,10 +149,7 @@ impl Rig {
     }
 
     pub fn written(&self, addr: u32) -> Option<u32> {
-        self.writes()
-            .iter()
-            .find(|(a, _)| *a == addr)
-            .map(|(_, value)| *value)
+        self.writes().iter().find(|(a, _)| *a == addr).map(|(_, value)| *value)
     }
 
     pub fn address(&self, card: &str, offset: u32) -> u32 {
@@ -191,10 +158,7 @@ impl Rig {
 
     pub fn events(&self, kind: EventKind) -> Vec<Event> {
         let events = self.out.mail.events.iter();
-        events
-            .filter(|event| event.kind == kind as u32)
-            .copied()
-            .collect()
+        events.filter(|event| event.kind == kind as u32).copied().collect()
     }
 
     /// A transfer to the board's dual-ported RAM in the coming window.
@@ -216,13 +180,7 @@ impl Rig {
     pub fn command(&mut self, command: Command, status: u8) {
         self.inputs.mail.commands.push(command);
         let n = size_of::<Command>() as u32 / 4;
-        self.transfer(
-            messages::registers::mailbox::COMMAND,
-            n,
-            1,
-            status,
-            self.now() - 50_000,
-        );
+        self.transfer(messages::registers::mailbox::COMMAND, n, 1, status, self.now() - 50_000);
     }
 }
 

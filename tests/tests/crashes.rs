@@ -1,0 +1,149 @@
+//! Processes killed and stopped for real, at drawn moments: the run ends with exit code 1 and a message that names the
+//! process, its record is readable up to there, and nothing is left on the machine.
+//!
+//! Every run is under the bench's watchdog of 60 s and prints the time that its end took. `scripts/soak.sh` runs the long
+//! versions.
+
+use rack_tests::{Bench, Draw, Outcome, Running, Signal, signal};
+use std::time::Duration;
+
+const PROCESSES: [&str; 7] =
+    ["hw_sim", "da_io", "force_sensor_if", "encoder_if", "control_computer", "workstation", "bus_analyzer"];
+
+/// Starts a run that would last very long, and lets it go on for `delay` after its processes have started.
+fn start(bench: &Bench, delay: Duration) -> Running {
+    let scenario = bench.scenario("long.toml", &[]);
+    let out = bench.path("out");
+    let mut run = bench.start(&[
+        "run".as_ref(),
+        scenario.as_os_str(),
+        "--duration".as_ref(),
+        "100000".as_ref(),
+        "--out".as_ref(),
+        out.as_os_str(),
+    ]);
+    run.wait_for_processes(PROCESSES.len());
+    run.pause(delay);
+    run
+}
+
+fn drawn_delay(draw: &mut Draw) -> Duration {
+    Duration::from_millis(draw.below(1500) as u64)
+}
+
+/// The simulated time in a message.
+fn simulated_s(message: &str) -> f64 {
+    let (_, rest) = message.split_once("simulated time ").unwrap_or_else(|| panic!("no simulated time in: {message}"));
+    rest.split_whitespace().next().and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("no number in: {message}"))
+}
+
+/// Time of the last message of the record, which must be whole.
+fn recorded_s(bench: &Bench) -> f64 {
+    let record = bench.path("out/nominal.mcap");
+    bench.digest_of(&record);
+    let whole = bench.path("whole.mcap");
+    let outcome = bench.run(&["log".as_ref(), "recover".as_ref(), record.as_os_str(), "-o".as_ref(), whole.as_os_str()]);
+    let outcome = outcome.expect_code(0);
+    let (_, rest) = outcome.stdout.split_once("up to ").unwrap_or_else(|| panic!("{}", outcome.stdout));
+    rest.split_whitespace().next().and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("{}", outcome.stdout))
+}
+
+fn expect_failure_of(outcome: Outcome, process: &str) -> Outcome {
+    outcome.expect_code(1).expect_message(&format!("process `{process}`")).expect_nothing_left()
+}
+
+/// Sends `name` the signal `delay` after the start.
+fn harm(name: &str, with: Signal, delay: Duration) {
+    let bench = Bench::new();
+    let mut run = start(&bench, delay);
+    let victim = run.processes().into_iter().find(|process| process.name == name);
+    let victim = victim.unwrap_or_else(|| panic!("no process `{name}`"));
+    run.mark();
+    signal(victim.pid, with);
+    let outcome = expect_failure_of(run.wait(), name);
+    let reached = simulated_s(&outcome.stderr);
+    println!("{name}, {with:?} after {delay:?}: over in {:.2?}, at {reached} s of simulated time", outcome.took);
+    // a moment at which the record has hardly begun tells nothing
+    if reached > 0.1 {
+        let recorded = recorded_s(&bench);
+        // whoever kills the recorder loses the chunk that it was filling
+        let lost = if name == "bus_analyzer" { f64::MAX } else { 0.05 };
+        assert!(recorded > 0.0 && recorded >= reached - lost, "record up to {recorded} s, run up to {reached} s");
+    }
+}
+
+#[test]
+fn a_killed_process_ends_the_run_with_its_name() {
+    let mut draw = Draw::new(1);
+    for name in PROCESSES {
+        harm(name, Signal::KILL, drawn_delay(&mut draw));
+    }
+}
+
+#[test]
+fn a_stopped_process_ends_the_run_with_its_name() {
+    harm("encoder_if", Signal::STOP, Duration::from_millis(700));
+}
+
+#[test]
+fn a_stopped_recorder_ends_the_run_with_its_name() {
+    harm("bus_analyzer", Signal::STOP, Duration::from_millis(300));
+}
+
+#[test]
+#[ignore = "minutes; scripts/soak.sh runs it"]
+fn every_process_killed_and_stopped_at_many_moments() {
+    let rounds: u64 = std::env::var("SOAK_ROUNDS").ok().and_then(|rounds| rounds.parse().ok()).unwrap_or(5);
+    let mut draw = Draw::new(2);
+    for round in 0..rounds {
+        println!("round {round}");
+        for name in PROCESSES {
+            for with in [Signal::KILL, Signal::STOP] {
+                harm(name, with, drawn_delay(&mut draw));
+            }
+        }
+    }
+}
+
+#[test]
+fn ctrl_c_ends_the_run_in_order() {
+    for delay in [0, 600] {
+        let bench = Bench::new();
+        let mut run = start(&bench, Duration::from_millis(delay));
+        run.mark();
+        signal(run.pid(), Signal::INT);
+        let outcome = run.wait().expect_code(1).expect_message("interrupted").expect_nothing_left();
+        let reached = simulated_s(&outcome.stderr);
+        println!("Ctrl-C after {delay} ms: over in {:.2?}, at {reached} s of simulated time", outcome.took);
+        if reached > 0.1 {
+            let recorded = recorded_s(&bench);
+            assert!(recorded >= reached - 0.05, "record up to {recorded} s, run up to {reached} s");
+        }
+    }
+}
+
+#[test]
+fn a_killed_chassis_leaves_a_whole_record_and_nothing_else() {
+    for delay in [0, 900] {
+        let bench = Bench::new();
+        let mut run = start(&bench, Duration::from_millis(delay));
+        run.mark();
+        signal(run.pid(), Signal::KILL);
+        let outcome = run.wait().expect_nothing_left();
+        println!("SIGKILL of the chassis after {delay} ms: over in {:.2?}", outcome.took);
+        if delay > 0 {
+            assert!(recorded_s(&bench) > 0.1);
+        }
+    }
+}
+
+#[test]
+fn a_finished_run_leaves_its_results_and_nothing_else() {
+    let bench = Bench::new();
+    let (scenario, out) = (bench.scenario("short.toml", &[]), bench.path("out"));
+    let arguments = ["run".as_ref(), scenario.as_os_str(), "--duration".as_ref(), "0.2".as_ref(), "--out".as_ref(), out.as_os_str()];
+    bench.run(&arguments).expect_code(0).expect_nothing_left();
+    let mut files: Vec<_> = std::fs::read_dir(&out).expect("results").flatten().map(|file| file.file_name()).collect();
+    files.sort();
+    assert_eq!(files, ["nominal.mcap", "report.html", "report.json"]);
+}

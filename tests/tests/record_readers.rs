@@ -1,0 +1,31 @@
+//! The record opens with the tools that others use, which agree about what it says.
+
+use rack_tests::{Bench, target_folder, workspace};
+use serde_json::Value;
+use std::process::Command;
+
+#[test]
+fn python_mcap_and_rosbags_read_the_same_from_a_record() {
+    let python = Command::new(workspace().join("scripts/python-env.sh"))
+        .env("CARGO_TARGET_DIR", target_folder())
+        .output()
+        .expect("scripts/python-env.sh");
+    assert!(python.status.success(), "{}", String::from_utf8_lossy(&python.stderr));
+    let python = String::from_utf8_lossy(&python.stdout).trim().to_owned();
+
+    let bench = Bench::new();
+    let (scenario, out) = (bench.scenario("s.toml", &[]), bench.path("out"));
+    let arguments = ["run".as_ref(), scenario.as_os_str(), "--duration".as_ref(), "1.2".as_ref(), "--out".as_ref(), out.as_os_str()];
+    bench.run(&arguments).expect_code(0);
+    let mut read = Command::new(workspace().join(python));
+    read.arg(workspace().join("tests/readers/read_record.py")).arg(out.join("nominal.mcap"));
+    let outcome = bench.start_command(read).wait().expect_code(0);
+    let read: Value = serde_json::from_str(&outcome.stdout).expect("the reader prints JSON");
+    // 200 Hz of control
+    let states = read["messages"]["/control/state"].as_u64().expect("count");
+    assert!((235..=240).contains(&states), "{states} control jobs in 1.2 s");
+    let report = std::fs::read_to_string(out.join("report.json")).expect("report");
+    let report: Value = serde_json::from_str(&report).expect("JSON");
+    let reads: u64 = report["variants"][0]["transfers"].as_array().expect("paths").iter().filter_map(|path| path["n"].as_u64()).sum();
+    assert!(reads > 0 && read["last_transfers"].as_array().is_some_and(|window| !window.is_empty()));
+}

@@ -39,7 +39,8 @@ pub struct Bell {
 impl Bells {
     /// Maps the page at `path` with room for `count` bells, creating it where it does not exist.
     pub fn open(path: &Path, count: usize) -> Result<Bells, ChannelError> {
-        let failed = |error: std::io::Error| ChannelError::Bell { path: path.display().to_string(), reason: error.to_string() };
+        let failed =
+            |error: std::io::Error| ChannelError::Bell { path: path.display().to_string(), reason: error.to_string() };
         let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
         file.set_len((count * STRIDE) as u64).map_err(failed)?;
         // SAFETY: the file belongs to this run alone, has just been sized and is never shrunk while a process maps it;
@@ -102,10 +103,8 @@ impl Bell {
 
     fn block(&mut self, limit: Duration) -> bool {
         let (counter, sleeping) = (self.bells.word(self.index, 0), self.bells.word(self.index, 1));
-        let timeout = rustix::thread::futex::Timespec {
-            tv_sec: limit.as_secs() as _,
-            tv_nsec: limit.subsec_nanos().into(),
-        };
+        let timeout =
+            rustix::thread::futex::Timespec { tv_sec: limit.as_secs() as _, tv_nsec: limit.subsec_nanos().into() };
         sleeping.store(1, Ordering::SeqCst);
         // returns at once where the counter has moved; a spurious end is the caller's next wait
         let _ = futex::wait(counter, futex::Flags::empty(), self.heard, Some(&timeout));

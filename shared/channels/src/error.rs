@@ -16,7 +16,9 @@ pub enum ChannelError {
         reason: String,
     },
     /// A message reached fewer readers than the rack's wiring has.
-    #[error("channel {channel}: a message reached {reached} of {readers} readers: a reader is gone or its queue is full")]
+    #[error(
+        "channel {channel}: a message reached {reached} of {readers} readers: a reader is gone or its queue is full"
+    )]
     Undelivered {
         /// Name of the channel.
         channel: String,

@@ -1,5 +1,6 @@
 //! The mail of one process: what its boards send goes to the boards beside them and to other processes.
 
+use crate::transport::{Transport, wall_ns};
 use crate::{ChannelError, Domain, Port, Sender};
 use board::routes::{ROUTES, Route};
 use board::{BoardId, Mail};
@@ -20,17 +21,21 @@ pub struct Exchange {
     local: Vec<(Route, Vec<BoardId>)>,
     outlets: Vec<(BoardId, Box<dyn Outlet>)>,
     inlets: Vec<Box<dyn Inlet>>,
+    measured: bool,
 }
 
 trait Outlet {
-    fn send(&mut self, mail: &Mail) -> Result<(), ChannelError>;
+    /// `stamped`: the header says when on the wall clock.
+    fn send(&mut self, mail: &Mail, stamped: bool) -> Result<(), ChannelError>;
     /// The reader in that process is gone for good.
     fn forget(&mut self, board: BoardId);
 }
 
 trait Inlet {
     fn readers(&self) -> &[BoardId];
-    fn receive(&mut self, inboxes: &mut Inboxes) -> Result<(), ChannelError>;
+    fn receive(&mut self, stepped_to: Ns, inboxes: &mut Inboxes) -> Result<(), ChannelError>;
+    fn measure(&mut self);
+    fn transport(&self) -> Option<&Transport>;
 }
 
 /// A kind of payload: where it lies in a [`Mail`].
@@ -87,10 +92,11 @@ impl<T: Payload> TypedOutlet<T> {
 }
 
 impl<T: Payload> Outlet for TypedOutlet<T> {
-    fn send(&mut self, mail: &Mail) -> Result<(), ChannelError> {
+    fn send(&mut self, mail: &Mail, stamped: bool) -> Result<(), ChannelError> {
         for payload in T::of(mail).chunks(LENGTH) {
             let t = payload.last().map_or(0, Payload::newest);
-            self.sender.send(&Header { t, seq: self.seq, crc: 0, wall_ns: 0 }, payload)?;
+            self.sender
+                .send(&Header { t, seq: self.seq, crc: 0, wall_ns: if stamped { wall_ns() } else { 0 } }, payload)?;
             self.seq = self.seq.wrapping_add(1);
         }
         Ok(())
@@ -108,11 +114,12 @@ struct TypedInlet<T: Payload> {
     port: Port<T, Header>,
     expected: u32,
     readers: Vec<BoardId>,
+    transport: Option<Transport>,
 }
 
 impl<T: Payload> TypedInlet<T> {
     fn open(domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize) -> Result<Self, ChannelError> {
-        Ok(TypedInlet { port: Port::open(domain, name, processes, BUFFER)?, expected: 0, readers })
+        Ok(TypedInlet { port: Port::open(domain, name, processes, BUFFER)?, expected: 0, readers, transport: None })
     }
 }
 
@@ -121,10 +128,21 @@ impl<T: Payload> Inlet for TypedInlet<T> {
         &self.readers
     }
 
-    fn receive(&mut self, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
-        let Self { port, expected, readers } = self;
+    fn measure(&mut self) {
+        self.transport = Some(Transport::new(self.port.name()));
+    }
+
+    fn transport(&self) -> Option<&Transport> {
+        self.transport.as_ref()
+    }
+
+    fn receive(&mut self, stepped_to: Ns, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
+        let Self { port, expected, readers, transport } = self;
         let mut gap = None;
         while port.receive(|header, payload| {
+            if let Some(transport) = transport {
+                transport.arrived(header, stepped_to);
+            }
             if header.seq != *expected {
                 gap = Some((*expected, header.seq));
             }
@@ -166,7 +184,8 @@ impl Exchange {
         let mut exchange = Exchange::default();
         for route in ROUTES {
             let readers: Vec<BoardId> = route.to.iter().copied().filter(|reader| here.contains(reader)).collect();
-            let away: Vec<BoardId> = route.to.iter().copied().filter(|reader| process_of(*reader) != process_of(route.from)).collect();
+            let away: Vec<BoardId> =
+                route.to.iter().copied().filter(|reader| process_of(*reader) != process_of(route.from)).collect();
             let mut processes: Vec<usize> = away.iter().map(|reader| process_of(*reader)).collect();
             processes.sort_unstable();
             processes.dedup();
@@ -195,12 +214,28 @@ impl Exchange {
                 copy(route.kind, mail, &mut inboxes[*reader as usize]);
             }
         }
-        self.outlets.iter_mut().filter(|(sender, _)| *sender == from).try_for_each(|(_, outlet)| outlet.send(mail))
+        self.outlets
+            .iter_mut()
+            .filter(|(sender, _)| *sender == from)
+            .try_for_each(|(_, outlet)| outlet.send(mail, self.measured))
     }
 
-    /// Takes in what other processes sent to `to`.
-    pub fn fetch(&mut self, to: BoardId, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
-        self.inlets.iter_mut().filter(|inlet| inlet.readers().contains(&to)).try_for_each(|inlet| inlet.receive(inboxes))
+    /// Takes in what other processes sent to `to`, which has acted up to `stepped_to`: where transport is measured, what
+    /// is not newer than that has come late.
+    pub fn fetch(&mut self, to: BoardId, stepped_to: Ns, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
+        let mut inlets = self.inlets.iter_mut().filter(|inlet| inlet.readers().contains(&to));
+        inlets.try_for_each(|inlet| inlet.receive(stepped_to, inboxes))
+    }
+
+    /// From now on messages say when they were sent on the wall clock, and arrivals are measured.
+    pub fn measure(&mut self) {
+        self.measured = true;
+        self.inlets.iter_mut().for_each(|inlet| inlet.measure());
+    }
+
+    /// What has been measured, a channel each.
+    pub fn transports(&self) -> impl Iterator<Item = &Transport> {
+        self.inlets.iter().filter_map(|inlet| inlet.transport())
     }
 
     /// The process of `board` is gone for good: messages need not reach it any more.
@@ -242,13 +277,13 @@ mod tests {
             let mut b = Exchange::open(&here, Some(&other), process_of).expect("open");
             let (mut at_a, mut at_b) = (Inboxes::default(), Inboxes::default());
             a.deliver(DaIo, &mail_with_command(), &mut at_a).expect("deliver");
-            b.fetch(HwSim, &mut at_b).expect("fetch");
+            b.fetch(HwSim, 0, &mut at_b).expect("fetch");
             assert_eq!(at_b[HwSim as usize].amplifier, mail_with_command().amplifier);
             let mut mail = Mail::default();
             // one message more than fits a sample's preallocated length
             mail.plant.resize(LENGTH + 1, bytemuck::Zeroable::zeroed());
             b.deliver(HwSim, &mail, &mut at_b).expect("deliver");
-            a.fetch(EncoderIf, &mut at_a).expect("fetch");
+            a.fetch(EncoderIf, 0, &mut at_a).expect("fetch");
             assert_eq!(at_a[EncoderIf as usize].plant.len(), LENGTH + 1);
             assert_eq!(at_a[DaIo as usize].plant.len(), LENGTH + 1);
             assert_eq!(at_b[ForceSensorIf as usize].plant.len(), LENGTH + 1);

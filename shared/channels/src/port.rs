@@ -8,7 +8,8 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::*;
 use std::fmt::Debug;
 
-type Service<T, H> = iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, [Plain<T>], Plain<H>>;
+type Service<T, H> =
+    iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, [Plain<T>], Plain<H>>;
 
 /// The sending end.
 pub struct Sender<T: Pod + Debug, H: Pod + Debug> {
@@ -49,7 +50,13 @@ fn service<T: Pod + Debug, H: Pod + Debug>(
 
 impl<T: Pod + Debug, H: Pod + Debug> Sender<T, H> {
     /// Opens the sending end towards `readers` other processes, each with room for `buffer` messages of at most `length` elements.
-    pub fn open(domain: &Domain, name: &str, readers: usize, buffer: usize, length: usize) -> Result<Self, ChannelError> {
+    pub fn open(
+        domain: &Domain,
+        name: &str,
+        readers: usize,
+        buffer: usize,
+        length: usize,
+    ) -> Result<Self, ChannelError> {
         let publisher = service::<T, H>(domain, name, buffer, readers)?
             .publisher_builder()
             .initial_max_slice_len(length)
@@ -65,8 +72,10 @@ impl<T: Pod + Debug, H: Pod + Debug> Sender<T, H> {
 
     /// Sends one message; an error where it does not reach every reader.
     pub fn send(&self, header: &H, payload: &[T]) -> Result<(), ChannelError> {
-        let failed = |operation, reason: String| ChannelError::Transport { channel: self.name.clone(), operation, reason };
-        let mut sample = self.publisher.loan_slice_uninit(payload.len()).map_err(|error| failed("loaning", format!("{error:?}")))?;
+        let failed =
+            |operation, reason: String| ChannelError::Transport { channel: self.name.clone(), operation, reason };
+        let mut sample =
+            self.publisher.loan_slice_uninit(payload.len()).map_err(|error| failed("loaning", format!("{error:?}")))?;
         sample.user_header_mut().0 = *header;
         let reached = sample
             .write_from_fn(|i| Plain(payload[i]))
@@ -87,13 +96,14 @@ impl<T: Pod + Debug, H: Pod + Debug> Sender<T, H> {
 impl<T: Pod + Debug, H: Pod + Debug> Port<T, H> {
     /// Opens a receiving end; `readers` and `buffer` as for [`Sender::open`].
     pub fn open(domain: &Domain, name: &str, readers: usize, buffer: usize) -> Result<Self, ChannelError> {
-        let subscriber = service::<T, H>(domain, name, buffer, readers)?.subscriber_builder().buffer_size(buffer).create().map_err(
-            |error| ChannelError::Setup {
-                channel: name.to_owned(),
-                operation: "creating a receiving end",
-                reason: format!("{error:?}"),
-            },
-        )?;
+        let subscriber =
+            service::<T, H>(domain, name, buffer, readers)?.subscriber_builder().buffer_size(buffer).create().map_err(
+                |error| ChannelError::Setup {
+                    channel: name.to_owned(),
+                    operation: "creating a receiving end",
+                    reason: format!("{error:?}"),
+                },
+            )?;
         Ok(Port { name: name.to_owned(), subscriber })
     }
 

@@ -30,7 +30,12 @@ pub struct Host {
 
 impl Host {
     /// Builds the boards `here` with `factory`.
-    pub fn new(here: &[BoardId], exchange: Exchange, context: &Context, factory: Factory<'_>) -> Result<Host, RunError> {
+    pub fn new(
+        here: &[BoardId],
+        exchange: Exchange,
+        context: &Context,
+        factory: Factory<'_>,
+    ) -> Result<Host, RunError> {
         let boards = here
             .iter()
             .filter(|id| **id != BoardId::Chassis)
@@ -39,13 +44,7 @@ impl Host {
                 Err(reason) => Err(RunError::Board { board: id.name(), reason }),
             })
             .collect::<Result<_, _>>()?;
-        Ok(Host {
-            boards,
-            exchange,
-            inboxes: Box::default(),
-            inputs: Inputs::default(),
-            outputs: Outputs::default(),
-        })
+        Ok(Host { boards, exchange, inboxes: Box::default(), inputs: Inputs::default(), outputs: Outputs::default() })
     }
 
     /// Steps the board that the grant names.
@@ -58,7 +57,7 @@ impl Host {
                 when: crate::error::at(grant.until),
             });
         };
-        self.exchange.fetch(id, &mut self.inboxes)?;
+        self.exchange.fetch(id, 0, &mut self.inboxes)?;
         let inputs = &mut self.inputs;
         inputs.from = grant.from;
         inputs.until = grant.until;
@@ -86,7 +85,7 @@ impl Host {
 
     /// Takes in the mail for the chassis itself.
     pub fn read(&mut self) -> Result<&mut Mail, RunError> {
-        self.exchange.fetch(BoardId::Chassis, &mut self.inboxes)?;
+        self.exchange.fetch(BoardId::Chassis, 0, &mut self.inboxes)?;
         Ok(&mut self.inboxes[BoardId::Chassis as usize])
     }
 

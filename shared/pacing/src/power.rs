@@ -24,7 +24,11 @@ impl Power {
     /// Starts one process: `command` with the run folder and its own name appended.
     pub fn spawn(&mut self, name: &str, command: &[String], folder: &Path) -> Result<(), RunError> {
         let program = command.first().cloned().unwrap_or_default();
-        let failed = |error: std::io::Error| RunError::Spawn { process: name.to_owned(), program: program.clone(), reason: error.to_string() };
+        let failed = |error: std::io::Error| RunError::Spawn {
+            process: name.to_owned(),
+            program: program.clone(),
+            reason: error.to_string(),
+        };
         // results go to standard output, and only the chassis has any
         let stderr = std::io::stderr().as_fd().try_clone_to_owned().map_err(failed)?;
         let child = Command::new(&program)

@@ -59,7 +59,8 @@ impl Remote {
             when: at(now),
         };
         let board = BoardId::from_number(reply.board as u8).ok_or_else(|| bad("a board number that does not exist"))?;
-        let ops = ops.ok_or_else(|| bad("a bus program with an operation that does not exist, or a far too long one"))?;
+        let ops =
+            ops.ok_or_else(|| bad("a bus program with an operation that does not exist, or a far too long one"))?;
         let mut answer = Answer::default();
         if reply.flags & flags::EARLY != 0 {
             answer.early = Some(reply.early);

@@ -61,7 +61,9 @@ impl RunFolder {
         let time = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_nanos() as u64);
         for attempt in 0..100_u64 {
             // unique together with the folder's creation: a taken name is tried again
-            let id = base36(time.wrapping_mul(31).wrapping_add(u64::from(std::process::id())).wrapping_add(attempt) % 36_u64.pow(7));
+            let id = base36(
+                time.wrapping_mul(31).wrapping_add(u64::from(std::process::id())).wrapping_add(attempt) % 36_u64.pow(7),
+            );
             let path = base.join(&id);
             match std::fs::create_dir(&path) {
                 Ok(()) => return RunFolder::join(&path),
@@ -93,7 +95,8 @@ impl RunFolder {
     pub fn read_context(&self) -> Result<Context, RunError> {
         let path = self.path.join("context.toml");
         let text = std::fs::read_to_string(&path).map_err(failed(&path))?;
-        toml::from_str(&text).map_err(|error| RunError::Folder { path: path.display().to_string(), reason: error.to_string() })
+        toml::from_str(&text)
+            .map_err(|error| RunError::Folder { path: path.display().to_string(), reason: error.to_string() })
     }
 }
 

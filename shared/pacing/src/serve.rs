@@ -43,7 +43,10 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
     let context = folder.read_context()?;
     let processes = &context.scenario.processes;
     let Some(index) = processes.iter().position(|process| process.name == name) else {
-        return Err(RunError::Folder { path: path.display().to_string(), reason: format!("no process `{name}` in this run") });
+        return Err(RunError::Folder {
+            path: path.display().to_string(),
+            reason: format!("no process `{name}` in this run"),
+        });
     };
     let here: Vec<BoardId> = processes[index].boards.iter().filter_map(|board| BoardId::from_name(board)).collect();
     let domain = Domain::join(&folder.path, &folder.prefix, name)?;
@@ -92,5 +95,6 @@ fn lifeline_cut() -> bool {
     let stdin = std::io::stdin();
     let mut poll_fd = [PollFd::new(&stdin, PollFlags::empty())];
     let now = Timespec { tv_sec: 0, tv_nsec: 0 };
-    matches!(poll(&mut poll_fd, Some(&now)), Ok(1)) && poll_fd[0].revents().intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL)
+    matches!(poll(&mut poll_fd, Some(&now)), Ok(1))
+        && poll_fd[0].revents().intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL)
 }

@@ -18,7 +18,7 @@ fn start(bench: &Bench, delay: Duration) -> Running {
         "run".as_ref(),
         scenario.as_os_str(),
         "--duration".as_ref(),
-        "100000".as_ref(),
+        "30000".as_ref(),
         "--out".as_ref(),
         out.as_os_str(),
     ]);

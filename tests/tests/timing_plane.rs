@@ -10,7 +10,7 @@ use pacing::{Context, Flow, Lockstep, Observer};
 use scenario::Scenario;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
-use vme::{MICROSECOND, MILLISECOND, Transfer};
+use vme::{Log, MICROSECOND, MILLISECOND, Origin};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// Period of the force receiver's samples.
@@ -44,10 +44,11 @@ impl Board for Spy {
 }
 
 impl Observer for &Notes {
-    fn window(&mut self, _until: Ns, mail: &Mail, transfers: &[Transfer]) -> Flow {
+    fn window(&mut self, _until: Ns, mail: &Mail, log: &Log) -> Flow {
         let mut seen = self.lock().expect("one thread");
         seen.decisions.extend_from_slice(&mail.control_probe);
-        seen.transfers.extend(transfers.iter().map(TransferRecord::from));
+        let programs = log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program);
+        seen.transfers.extend(programs.map(TransferRecord::from));
         Flow::Continue
     }
 }

@@ -84,7 +84,7 @@ fn a_board_that_sleeps_is_a_reported_fault() {
 
 #[test]
 fn a_board_that_spins_for_ever_is_a_reported_fault() {
-    fault("spins", &["process `mine` is stalled", "of processor time"]);
+    fault("spins", &["process `mine` is stalled", "it has used 5 s of processor time"]);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The boards of one process and their mail.
 
+use crate::holdback::take_before;
 use crate::{Context, RunError};
 use board::{Board, BoardId, Decision, Inputs, Mail, Ns, Op, Outputs};
 use channels::{Exchange, Inboxes};
@@ -68,7 +69,12 @@ impl Host {
             (grant.flags & flags::DECIDE != 0).then_some(Decision { task: grant.task as u16, job: grant.job });
         inputs.transfers.clear();
         inputs.transfers.extend_from_slice(transfers);
-        std::mem::swap(&mut inputs.mail, &mut self.inboxes[id as usize]);
+        let inbox = &mut self.inboxes[id as usize];
+        if id == BoardId::BusAnalyzer && !inputs.finish {
+            take_before(grant.until, inbox, &mut inputs.mail);
+        } else {
+            std::mem::swap(&mut inputs.mail, inbox);
+        }
         self.outputs.clear();
         if let Some((_, board)) = self.boards.iter_mut().find(|(known, _)| *known == id) {
             board.step(grant.until, &self.inputs, &mut self.outputs);

@@ -11,6 +11,7 @@
 #![warn(missing_docs)]
 
 mod error;
+mod holdback;
 mod host;
 mod lockstep;
 mod power;

@@ -23,4 +23,4 @@ pub use measures::RunMeasures;
 pub use result::{RunReport, SCHEMA_VERSION, Sweep, SweepPoint, VariantResult, WriteError};
 pub use segments::SegmentRow;
 pub use trace::{Ended, Trace};
-pub use verdict::{Check, Verdict};
+pub use verdict::{Check, Verdict, segments_with};

@@ -73,6 +73,7 @@ impl VariantResult {
         };
         let force = plant(&|probe| probe.contact[axis]);
         let position = plant(&|probe| probe.position[axis]);
+        let encoder_position = control(&|probe| probe.x[axis]);
         let target = control(&|probe| probe.xt[axis]);
         let desired = control(&|probe| probe.xd[axis]);
         let until = match &ended {
@@ -90,6 +91,7 @@ impl VariantResult {
             &Signals {
                 force: &force,
                 position: &position,
+                encoder_position: Some(&encoder_position),
                 target: Some(&target),
                 desired: &desired,
                 ideal_position: ideal.as_ref().map(|ideal| &ideal.position),
@@ -231,6 +233,7 @@ fn ideal_rows(
     let signals = Signals {
         force: &ideal.force,
         position: &ideal.position,
+        encoder_position: None,
         target: None,
         desired,
         ideal_position: None,

@@ -1,7 +1,17 @@
 //! Scenarios that ship inside the command.
 
 /// Name, text of every built-in scenario, in the order in which they are listed.
-pub const SCENARIOS: &[(&str, &str)] = &[("table-5-3", include_str!("../../scenarios/table-5-3.toml"))];
+pub const SCENARIOS: &[(&str, &str)] = &[
+    ("table-5-3", include_str!("../../scenarios/table-5-3.toml")),
+    ("figure-6-3", include_str!("../../scenarios/figure-6-3.toml")),
+    ("figure-6-5", include_str!("../../scenarios/figure-6-5.toml")),
+    ("figure-6-6", include_str!("../../scenarios/figure-6-6.toml")),
+    ("after-6-6", include_str!("../../scenarios/after-6-6.toml")),
+    ("surface-cleaning", include_str!("../../scenarios/surface-cleaning.toml")),
+    ("self-motion", include_str!("../../scenarios/self-motion.toml")),
+    ("joint-limits", include_str!("../../scenarios/joint-limits.toml")),
+    ("friction-compensation", include_str!("../../scenarios/friction-compensation.toml")),
+];
 
 /// The text of a built-in scenario.
 pub fn text(name: &str) -> Option<&'static str> {

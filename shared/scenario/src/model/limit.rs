@@ -33,12 +33,20 @@ pub enum Measure {
     ForceMeanErrorN,
     /// Per segment: rms of force − F_d over the last second, N.
     ForceRmsErrorN,
+    /// Per segment: rms of force − F_d over all of it but its first 2 s, N.
+    ForceTrackingErrorN,
+    /// Per segment: mean force of the last second, N.
+    ForceMeanN,
+    /// Per segment: least force, N.
+    ForceLeastN,
     /// Per segment: greatest force, N.
     ForcePeakN,
     /// Per segment: 90 % rise time from the first contact, s.
     ForceRiseS,
     /// Per segment: |X − X_d| along the report's axis at its end, m.
     PositionErrorM,
+    /// Per segment: the same of X as the controller has it from the encoders, which do not see the joints give, m.
+    EncoderPositionErrorM,
     /// Per segment: greatest |X − ideal impedance| along the report's axis, m.
     IdealPositionDeviationM,
     /// Per segment: greatest |Xᵗ − ideal impedance| along the report's axis, m.

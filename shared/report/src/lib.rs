@@ -5,6 +5,8 @@
 //! [`text`] for the terminal, [`RunReport::write`] for the files. A figure that does not exist (a force
 //! that never rose, a segment never reached) is `None` and shown as `–`, never a made-up number.
 
+mod accounting;
+mod bus_rows;
 mod chart;
 mod html;
 mod ideal;
@@ -18,6 +20,9 @@ pub mod text;
 mod trace;
 mod verdict;
 
+pub use accounting::{
+    Accounting, BusAccount, MasterAccount, PartAccount, Spread, TaskAccount, WaterfallAccount,
+};
 pub use ledger::{Ledger, PathLatency};
 pub use measures::RunMeasures;
 pub use result::{RunReport, SCHEMA_VERSION, Sweep, SweepPoint, VariantResult, WriteError};

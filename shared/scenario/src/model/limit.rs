@@ -65,4 +65,10 @@ pub enum Measure {
     SelfMotionRadPerS,
     /// Per run: least distance of a joint from its limit, rad.
     JointLimitDistanceRad,
+    /// Per run: share of the time for which somebody kept the bus.
+    BusLoad,
+    /// Per run: releases lost by tasks whose job before still ran.
+    LostReleases,
+    /// Per run: longest time from what the force sensor felt to the last D/A's change, s.
+    SensorToActuatorS,
 }

@@ -26,6 +26,8 @@ const RECORDER_CREDIT: u32 = 64;
 const WATCH_PERIOD: Duration = Duration::from_millis(50);
 /// No answer for this long and no sign of life: stalled.
 const STALL: Duration = Duration::from_secs(5);
+/// Processor time that no single answer takes.
+const SPIN_S: u64 = 5;
 /// Processes get this long to report ready.
 const READY_LIMIT: Duration = Duration::from_secs(30);
 
@@ -305,6 +307,7 @@ impl Lockstep {
                 (grant.task, grant.job) = (task.into(), job);
             }
             let answer = self.ask(&grant)?;
+            self.expect_no_early(board, &answer)?;
             if let Some((task, _)) = decides {
                 if let Some(rest) = answer.rest {
                     let longest = &mut self.longest[usize::from(task)][1];
@@ -455,7 +458,8 @@ impl Lockstep {
     }
 
     fn await_reply(&mut self, remote: usize, now: Ns) -> Result<(BoardId, u64, Answer), RunError> {
-        let mut waiting: Option<(Instant, u64)> = None;
+        // wall time and processor time of the board, at first and since it was last seen at work
+        let (mut first, mut waiting): (Option<(Instant, u64)>, Option<(Instant, u64)>) = (None, None);
         loop {
             if let Some(reply) = self.remotes[remote].reply(now)? {
                 return Ok(reply);
@@ -466,21 +470,22 @@ impl Lockstep {
             }
             self.watch()?;
             let name = &self.remotes[remote].process;
-            let (since, used) = *waiting.get_or_insert_with(|| (Instant::now(), self.power.used(name)));
-            if since.elapsed() > STALL {
-                match self.power.idle(name, used) {
-                    Some(how) => {
-                        return Err(RunError::Stalled {
-                            process: name.clone(),
-                            how: how.into(),
-                            waited_s: since.elapsed().as_secs_f64(),
-                            when: at(now),
-                        });
-                    }
-                    // starved, not stalled
-                    None => waiting = None,
-                }
-            }
+            let used = self.power.used(name);
+            let (asked, used_at_first) = *first.get_or_insert((Instant::now(), used));
+            let (since, used_before) = *waiting.get_or_insert((Instant::now(), used));
+            let how = if used.saturating_sub(used_at_first) > SPIN_S * rustix::param::clock_ticks_per_second() {
+                Some(format!("it has used {SPIN_S} s of processor time"))
+            } else if since.elapsed() > STALL {
+                self.power.idle(name, used_before).map(str::to_owned)
+            } else {
+                continue;
+            };
+            let Some(how) = how else {
+                // starved, not stalled
+                waiting = None;
+                continue;
+            };
+            return Err(RunError::Stalled { process: name.clone(), how, waited_s: asked.elapsed().as_secs_f64(), when: at(now) });
         }
     }
 }

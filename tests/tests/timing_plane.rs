@@ -107,7 +107,10 @@ fn check_force_reads(offset: Ns) -> usize {
     assert!(reads.len() > 250, "{} reads", reads.len());
     let mut newer_than_the_period = 0;
     for read in reads {
-        let transfer = seen.transfers.iter().find(|transfer| (transfer.task, transfer.job, transfer.index) == (read.task, read.job, read.index));
+        let transfer = seen
+            .transfers
+            .iter()
+            .find(|transfer| (transfer.task, transfer.job, transfer.index) == (read.task, read.job, read.index));
         let at = transfer.expect("the read's transfer").data_at;
         assert_eq!(read.t, at);
         let release = offset + Ns::from(read.job) * period;
@@ -116,14 +119,25 @@ fn check_force_reads(offset: Ns) -> usize {
         let value = i64::from(read.value as u16 as i16);
         let expected = counts_at(&seen.plant, newest);
         // the last bit of the wires' interpolation may round the other way
-        assert!((value - expected).abs() <= 1, "job {}: {value} counts at {at} ns, {expected} on the wires at {newest} ns", read.job);
+        assert!(
+            (value - expected).abs() <= 1,
+            "job {}: {value} counts at {at} ns, {expected} on the wires at {newest} ns",
+            read.job
+        );
         let start = counts_at(&seen.plant, Ns::from(read.job) * period);
         newer_than_the_period += usize::from((value - start).abs() > 1);
     }
     // the control law is told the age that this makes
     for decision in &seen.decisions[1..] {
         let published = decision.t - decision.force_age;
-        assert_eq!(published % SAMPLE_NS, 0, "job {}: age {} ns at {} ns", decision.job, decision.force_age, decision.t);
+        assert_eq!(
+            published % SAMPLE_NS,
+            0,
+            "job {}: age {} ns at {} ns",
+            decision.job,
+            decision.force_age,
+            decision.t
+        );
     }
     newer_than_the_period
 }
@@ -160,13 +174,20 @@ fn a_stop_decided_at_t_reaches_the_amplifiers_at_t_plus_its_modelled_path() {
         ],
     );
     let others = 0x7E;
-    let off = seen.amplifier.iter().find(|command| command.t >= TRIP_AT && command.enabled & others == 0).expect("torque off");
+    let off = seen
+        .amplifier
+        .iter()
+        .find(|command| command.t >= TRIP_AT && command.enabled & others == 0)
+        .expect("torque off");
     let own = seen.amplifier.iter().find(|command| command.t >= TRIP_AT && command.enabled & 1 == 0).expect("own trip");
     assert!(own.t < off.t && own.enabled & others == others, "the card stops the tripped axis at once, and no other");
     let decided = seen.decisions.iter().find(|decision| decision.state == TORQUE_OFF).expect("decision");
     assert!(decided.t > TRIP_AT && decided.t < off.t, "decided at {} ns", decided.t);
     // 20 µs of processor time, then one write; the processor card has kept the bus since its last read: no arbitration
-    let write = seen.transfers.iter().find(|transfer| !transfer.is_read() && transfer.job == decided.job && transfer.task == task as u16);
+    let write = seen
+        .transfers
+        .iter()
+        .find(|transfer| !transfer.is_read() && transfer.job == decided.job && transfer.task == task as u16);
     assert_eq!(write.expect("the stop's first write").data_at, off.t);
     assert_eq!(off.t, decided.t + 20 * MICROSECOND + bus.address_ns + card.write_ns);
 }

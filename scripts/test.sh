@@ -1,16 +1,11 @@
 #!/usr/bin/env bash
-# Builds the rack and runs every test: ./scripts/test.sh [arguments of `cargo test`]
-#
-# Sets up what is missing beyond a Rust toolchain. Long runs are in scripts/soak.sh.
+# Every test: builds the processes first, since whole-rack tests start them, then runs the workspace's tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/setup.sh
+# the record is read by outside tools in Python
+python3 -c 'import venv, ensurepip' 2>/dev/null || need_packages python3 python3-venv
+./scripts/python-env.sh >/dev/null
 
-# the outside readers of a record
-if ! ./scripts/python-env.sh >/dev/null; then
-    need_packages python3-venv
-    ./scripts/python-env.sh >/dev/null
-fi
-# the tests of the whole rack start the programs
-cargo build --workspace --bins
-cargo test --workspace "$@"
+cargo build --workspace --bins --locked
+cargo test --workspace --locked --no-fail-fast "$@"

@@ -2,8 +2,7 @@
 
 use crate::programs::program;
 use crate::running::{Outcome, Running};
-use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use tempfile::TempDir;
 use toml::{Table, Value};
@@ -36,15 +35,13 @@ impl Bench {
     }
 
     /// Writes a file.
-    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.path(name);
-        std::fs::write(&path, content).expect("write into the bench's folder");
-        path
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), content).expect("write into the bench's folder");
     }
 
     /// A scenario file made of the built-in `table-5-3`: every key stated, one variant `nominal`, no limits, no sweeps, and
-    /// these changes. A key path counts array elements from 0 or calls them by name.
-    pub fn scenario(&self, name: &str, edits: &[Edit<'_>]) -> PathBuf {
+    /// these changes; returns `name`. A key path counts array elements from 0 or calls them by name.
+    pub fn scenario<'n>(&self, name: &'n str, edits: &[Edit<'_>]) -> &'n str {
         let document = scenario::load("table-5-3", &[]).expect("built-in scenario");
         let text = toml::to_string(&document.scenario().expect("built-in scenario")).expect("scenario as text");
         let mut tree: Table = text.parse().expect("scenario as a tree");
@@ -55,11 +52,12 @@ impl Bench {
         for (key, value) in edits {
             set(&mut root, key, value.clone());
         }
-        self.write(name, toml::to_string(&root).expect("scenario as text"))
+        self.write(name, toml::to_string(&root).expect("scenario as text"));
+        name
     }
 
-    /// Starts `vmerack` with these arguments.
-    pub fn start<S: AsRef<OsStr>>(&self, arguments: &[S]) -> Running {
+    /// Starts `vmerack` with these arguments; its working folder is the bench's.
+    pub fn start(&self, arguments: &[&str]) -> Running {
         let mut command = Command::new(program("vmerack"));
         command.args(arguments);
         self.start_command(command)
@@ -78,26 +76,24 @@ impl Bench {
     }
 
     /// Runs `vmerack` with these arguments to its end.
-    pub fn run<S: AsRef<OsStr>>(&self, arguments: &[S]) -> Outcome {
+    pub fn run(&self, arguments: &[&str]) -> Outcome {
         self.start(arguments).wait()
     }
 
-    /// Runs a scenario file for so many simulated seconds with more `options`; the outcome is a passed run. Returns the digest of its
-    /// record, as `vmerack log digest` prints it.
-    pub fn digest(&self, scenario: &Path, seconds: f64, options: &[&str]) -> String {
+    /// Runs a scenario for so many simulated seconds with more `options`; it must pass and leave nothing behind. Returns the
+    /// digest of its record, as `vmerack log digest` prints it.
+    pub fn digest(&self, scenario: &str, seconds: f64, options: &[&str]) -> String {
         let out = tempfile::tempdir_in(self.folder.path()).expect("folder for the run");
-        let (seconds, out) = (seconds.to_string(), out.path());
-        let mut arguments: Vec<&OsStr> = vec!["run".as_ref(), scenario.as_ref(), "--duration".as_ref(), seconds.as_ref()];
-        arguments.extend(["--out".as_ref(), out.as_os_str()]);
-        arguments.extend(options.iter().map(OsStr::new));
-        self.run(&arguments).expect_code(0).expect_nothing_left();
-        self.digest_of(&out.join("nominal.mcap"))
+        let folder = out.path().to_str().expect("path");
+        let seconds = seconds.to_string();
+        let arguments = ["run", scenario, "--duration", &seconds, "--out", folder];
+        self.run(&[&arguments, options].concat()).expect_code(0).expect_nothing_left();
+        self.digest_of(&format!("{folder}/nominal.mcap"))
     }
 
     /// What `vmerack log digest` prints.
-    pub fn digest_of(&self, record: &Path) -> String {
-        let outcome = self.run(&["log".as_ref(), "digest".as_ref(), record.as_os_str()]);
-        let digest = outcome.expect_code(0).stdout.trim().to_owned();
+    pub fn digest_of(&self, record: &str) -> String {
+        let digest = self.run(&["log", "digest", record]).expect_code(0).stdout.trim().to_owned();
         assert!(digest.len() == 64 && digest.bytes().all(|byte| byte.is_ascii_hexdigit()), "no digest: {digest}");
         digest
     }

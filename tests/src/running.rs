@@ -84,14 +84,6 @@ impl Running {
         }
     }
 
-    /// Waits until the file has so many bytes.
-    pub fn wait_for_file(&mut self, path: &Path, bytes: u64) {
-        while std::fs::metadata(path).map_or(0, |file| file.len()) < bytes {
-            assert!(self.started.elapsed() < WATCHDOG, "{} does not reach {bytes} bytes in 60 s", path.display());
-            self.pause(POLL);
-        }
-    }
-
     /// Lets the run go on for so long; fails where it ends by itself.
     pub fn pause(&mut self, time: Duration) {
         let until = Instant::now() + time;

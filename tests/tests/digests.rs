@@ -32,16 +32,16 @@ fn noise() -> (&'static str, Value) {
 fn lock_step_across_processes_and_in_one_process_record_the_same() {
     let bench = Bench::new();
     let scenario = bench.scenario("s.toml", &[noise()]);
-    let apart = bench.digest(&scenario, SECONDS, &[]);
-    assert_eq!(apart, bench.digest(&scenario, SECONDS, &[]), "run again");
-    assert_eq!(apart, bench.digest(&scenario, SECONDS, &["--in-process"]));
+    let apart = bench.digest(scenario, SECONDS, &[]);
+    assert_eq!(apart, bench.digest(scenario, SECONDS, &[]), "run again");
+    assert_eq!(apart, bench.digest(scenario, SECONDS, &["--in-process"]));
 }
 
 #[test]
 fn another_seed_gives_another_record_where_there_is_noise() {
     let bench = Bench::new();
     let scenario = bench.scenario("s.toml", &[noise()]);
-    let of = |seed| bench.digest(&scenario, 0.3, &["--in-process", "--seed", seed]);
+    let of = |seed| bench.digest(scenario, 0.3, &["--in-process", "--seed", seed]);
     assert_eq!(of("1"), of("1"));
     assert_ne!(of("1"), of("2"));
 }
@@ -49,7 +49,7 @@ fn another_seed_gives_another_record_where_there_is_noise() {
 #[test]
 fn where_the_boards_live_does_not_show_in_the_record() {
     let bench = Bench::new();
-    let reference = bench.digest(&bench.scenario("s.toml", &[noise()]), SECONDS, &["--in-process"]);
+    let reference = bench.digest(bench.scenario("s.toml", &[noise()]), SECONDS, &["--in-process"]);
     let mut draw = Draw::new(7);
     for _ in 0..4 {
         let count = 2 + draw.below(4);
@@ -63,7 +63,7 @@ fn where_the_boards_live_does_not_show_in_the_record() {
         draw.shuffle(&mut list);
         list.retain(|(_, boards)| !boards.is_empty());
         let scenario = bench.scenario("placed.toml", &[noise(), ("process", processes(&list))]);
-        assert_eq!(bench.digest(&scenario, SECONDS, &[]), reference, "{list:?}");
+        assert_eq!(bench.digest(scenario, SECONDS, &[]), reference, "{list:?}");
     }
 }
 
@@ -72,21 +72,21 @@ fn the_order_in_which_processes_start_does_not_show_in_the_record() {
     let bench = Bench::new();
     let forwards = bench.scenario("forwards.toml", &[("process", one_each(BOARDS.into_iter()))]);
     let backwards = bench.scenario("backwards.toml", &[("process", one_each(BOARDS.into_iter().rev()))]);
-    assert_eq!(bench.digest(&forwards, SECONDS, &[]), bench.digest(&backwards, SECONDS, &[]));
+    assert_eq!(bench.digest(forwards, SECONDS, &[]), bench.digest(backwards, SECONDS, &[]));
 }
 
 #[test]
 fn two_busy_loops_beside_it_do_not_show_in_the_record() {
     let bench = Bench::new();
     let scenario = bench.scenario("s.toml", &[noise()]);
-    let quiet = bench.digest(&scenario, SECONDS, &["--in-process"]);
+    let quiet = bench.digest(scenario, SECONDS, &["--in-process"]);
     let busy = AtomicBool::new(true);
     let disturbed = std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| while busy.load(Ordering::Relaxed) {});
         }
         // the loops must end where the run fails, too
-        let run = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| bench.digest(&scenario, SECONDS, &[])));
+        let run = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| bench.digest(scenario, SECONDS, &[])));
         busy.store(false, Ordering::Relaxed);
         run
     });
@@ -97,19 +97,15 @@ fn two_busy_loops_beside_it_do_not_show_in_the_record() {
 fn two_runs_side_by_side_record_what_each_records_alone() {
     let bench = Bench::new();
     let scenario = bench.scenario("s.toml", &[noise()]);
-    let alone = ["1", "2"].map(|seed| bench.digest(&scenario, SECONDS, &["--seed", seed]));
+    let alone = ["1", "2"].map(|seed| bench.digest(scenario, SECONDS, &["--seed", seed]));
     // of one user in one TMPDIR
-    let together = ["1", "2"].map(|seed| {
-        let out = bench.path(&format!("out-{seed}"));
-        let scenario = scenario.as_os_str();
-        let seconds = SECONDS.to_string();
-        bench.start(&["run".as_ref(), scenario, "--seed".as_ref(), seed.as_ref(), "--duration".as_ref(), seconds.as_ref(), "--out".as_ref(), out.as_os_str()])
-    });
+    let seconds = SECONDS.to_string();
+    let together = ["1", "2"].map(|seed| bench.start(&["run", scenario, "--seed", seed, "--duration", &seconds, "--out", seed]));
     // each waits until nothing of either is left
     for run in together {
         run.wait().expect_code(0).expect_nothing_left();
     }
-    let records = ["1", "2"].map(|seed| bench.digest_of(&bench.path(&format!("out-{seed}/nominal.mcap"))));
+    let records = ["1", "2"].map(|seed| bench.digest_of(&format!("{seed}/nominal.mcap")));
     assert_eq!(records, alone);
     assert_ne!(records[0], records[1]);
 }

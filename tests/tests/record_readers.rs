@@ -14,11 +14,10 @@ fn python_mcap_and_rosbags_read_the_same_from_a_record() {
     let python = String::from_utf8_lossy(&python.stdout).trim().to_owned();
 
     let bench = Bench::new();
-    let (scenario, out) = (bench.scenario("s.toml", &[]), bench.path("out"));
-    let arguments = ["run".as_ref(), scenario.as_os_str(), "--duration".as_ref(), "1.2".as_ref(), "--out".as_ref(), out.as_os_str()];
-    bench.run(&arguments).expect_code(0);
+    let scenario = bench.scenario("s.toml", &[]);
+    bench.run(&["run", scenario, "--duration", "1.2", "--out", "out"]).expect_code(0);
     let mut read = Command::new(workspace().join(python));
-    read.arg(workspace().join("tests/readers/read_record.py")).arg(out.join("nominal.mcap"));
+    read.arg(workspace().join("tests/readers/read_record.py")).arg("out/nominal.mcap");
     let outcome = bench.start_command(read).wait().expect_code(0);
     let read: Value = serde_json::from_str(&outcome.stdout).expect("the reader prints JSON");
     // 200 Hz of control

@@ -5,7 +5,7 @@
 
 use board::{Board, BoardId, Inputs, Mail, Ns, Outputs};
 use messages::registers::force;
-use messages::{AmplifierCommand, BusWord, ControlProbe, PlantSample, TransferRecord, drive_status};
+use messages::{AmplifierCommand, BusWord, ControlProbe, PlantSample, TransferRecord};
 use pacing::{Context, Flow, Lockstep, Observer};
 use scenario::Scenario;
 use std::sync::atomic::AtomicBool;
@@ -43,9 +43,12 @@ impl Board for Spy {
     }
 }
 
-impl Observer for &Notes {
+/// The chassis' own view.
+struct Windows(Notes);
+
+impl Observer for Windows {
     fn window(&mut self, _until: Ns, mail: &Mail, log: &Log) -> Flow {
-        let mut seen = self.lock().expect("one thread");
+        let mut seen = self.0.lock().expect("one thread");
         seen.decisions.extend_from_slice(&mail.control_probe);
         let programs = log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program);
         seen.transfers.extend(programs.map(TransferRecord::from));
@@ -66,7 +69,7 @@ fn run(mut scenario: Scenario, seconds: f64, spies: &[(BoardId, fn(&Inputs, &mut
     };
     let context = Context { prefix: String::new(), variant: "nominal".into(), record: None, scenario };
     let mut rack = Lockstep::power_up(context, &factory, &|_| Vec::new(), &INTERRUPTED).expect("power-up");
-    rack.run(scenario::nanoseconds(seconds), &mut &notes).expect("run");
+    rack.run(scenario::nanoseconds(seconds), &mut Windows(Arc::clone(&notes))).expect("run");
     rack.finish().expect("end");
     std::mem::take(&mut *notes.lock().expect("one thread"))
 }

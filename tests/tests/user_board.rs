@@ -49,11 +49,9 @@ fn a_users_board_holds_the_arm_and_its_runs_repeat_to_the_bit() {
     let bench = Bench::new();
     let processes = processes(&[program.to_str().expect("path")]);
     let scenario = bench.scenario("mine.toml", &[("process", processes)]);
-    assert_eq!(bench.digest(&scenario, 1.0, &[]), bench.digest(&scenario, 1.0, &[]));
+    assert_eq!(bench.digest(scenario, 1.0, &[]), bench.digest(scenario, 1.0, &[]));
 
-    let out = bench.path("out");
-    let arguments = ["run".as_ref(), scenario.as_os_str(), "--duration".as_ref(), "1".as_ref(), "--json".as_ref(), "--out".as_ref(), out.as_os_str()];
-    let outcome = bench.run(&arguments).expect_code(0).expect_nothing_left();
+    let outcome = bench.run(&["run", scenario, "--duration", "1", "--json", "--out", "out"]).expect_code(0).expect_nothing_left();
     let report: Json = serde_json::from_str(&outcome.stdout).expect("JSON");
     let off = report["variants"][0]["segments"][0]["position_error_m"].as_f64();
     // the first segment holds the start pose; the user's controller sends no probe of its own
@@ -68,13 +66,12 @@ fn fault(how: &str, message: &[&str]) {
     let bench = Bench::new();
     let processes = processes(&[program.to_str().expect("path"), how]);
     let scenario = bench.scenario("faulty.toml", &[("process", processes)]);
-    let out = bench.path("out");
-    let mut outcome = bench.run(&["run".as_ref(), scenario.as_os_str(), "--out".as_ref(), out.as_os_str()]).expect_code(1).expect_nothing_left();
+    let mut outcome = bench.run(&["run", scenario, "--out", "out"]).expect_code(1).expect_nothing_left();
     for part in message.iter().chain(&["at simulated time 0.50"]) {
         outcome = outcome.expect_message(part);
     }
     println!("{how}: over in {:.2?}", outcome.took);
-    bench.digest_of(&out.join("nominal.mcap"));
+    bench.digest_of("out/nominal.mcap");
 }
 
 #[test]
@@ -106,7 +103,6 @@ fn a_board_that_cuts_a_window_is_a_reported_fault() {
 fn a_command_that_does_not_exist_is_named() {
     let bench = Bench::new();
     let scenario = bench.scenario("none.toml", &[("process", processes(&["./no_such_program"]))]);
-    let out = bench.path("out");
-    let arguments = ["run".as_ref(), scenario.as_os_str(), "--out".as_ref(), out.as_os_str()];
-    bench.run(&arguments).expect_code(1).expect_message("./no_such_program").expect_nothing_left();
+    let outcome = bench.run(&["run", scenario, "--out", "out"]).expect_code(1);
+    outcome.expect_message("./no_such_program").expect_nothing_left();
 }

@@ -183,5 +183,6 @@ const fn figures(kind: EventKind) -> [&'static str; 2] {
         MessageLost => ["sequence", ""],
         ForceSaturated => ["errors", ""],
         RecordLost => ["", ""],
+        OverrunTrip => ["job", "task"],
     }
 }

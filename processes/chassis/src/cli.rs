@@ -23,6 +23,7 @@ enum Command {
     Arm(commands::arm::ArmArgs),
     Bus(commands::bus::BusArgs),
     Design(commands::design::DesignArgs),
+    Sweep(commands::sweep::SweepArgs),
     /// Hosts the boards of one process; `vmerack run` starts it.
     #[command(hide = true)]
     Host {
@@ -51,6 +52,7 @@ pub fn main() -> ExitCode {
         Command::Arm(args) => commands::arm::run(args),
         Command::Bus(args) => commands::bus::run(args),
         Command::Design(args) => commands::design::run(args),
+        Command::Sweep(args) => commands::sweep::run(args),
         Command::Host { .. } => Ok(0),
     };
     match outcome {

@@ -7,3 +7,4 @@ pub mod log;
 pub mod run;
 pub mod scenario;
 pub mod scenarios;
+pub mod sweep;

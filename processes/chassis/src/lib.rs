@@ -2,6 +2,7 @@
 //!
 //! * [`commands`]: one file per subcommand; [`cli`] is their list.
 //! * [`rack_run`]: one variant of a scenario from power-up to the last window.
+//! * [`parallel`]: independent runs on all cores.
 //! * [`boards`]: the built-in board of every role.
 
 #![warn(missing_docs)]
@@ -9,4 +10,5 @@
 pub mod boards;
 pub mod cli;
 pub mod commands;
+pub mod parallel;
 pub mod rack_run;

@@ -4,13 +4,13 @@ use crate::boards;
 use board::{Mail, Ns};
 use messages::{EventKind, drive_status};
 use pacing::{Context, Flow, Lockstep, Observer, RunError};
-use report::{Ended, Ledger, Trace, VariantResult};
+use report::{Accounting, BusAccount, Ended, Ledger, Trace, VariantResult};
 use scenario::{Process, Scenario, Variant};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
-use vme::Transfer;
+use vme::{Log, Origin, Program};
 
 /// Set by Ctrl-C; every run of this process ends soon after.
 pub static INTERRUPTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
@@ -50,6 +50,7 @@ pub fn run(
     let mut witness = Witness {
         trace: Trace::with_capacity((scenario.duration() * 250.0) as usize),
         ledger: Ledger::new(scenario),
+        accounting: Accounting::new(scenario).map_err(|error| error.to_string())?,
         reached: 0,
         diverged: false,
         record_lost: false,
@@ -79,8 +80,38 @@ fn carry_out(scenario: &Scenario, variant: &Variant, setting: &Setting, witness:
     let context = Context { prefix: String::new(), variant: variant.name.clone(), record: setting.record.clone(), scenario };
     let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
     witness.start_up = witness.start.elapsed();
-    rack.run(end, witness)?;
+    let ran = rack.run(end, witness);
+    witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
+    ran?;
     rack.finish()
+}
+
+/// Runs the start of a scenario in this process, three periods of its slowest task, and returns the longest job of each
+/// task with the account of bus and processors.
+pub fn rehearse(scenario: &Scenario) -> Result<(Vec<Program>, BusAccount), String> {
+    let periods = scenario.rack.tasks.iter().map(|task| task.period_ns);
+    let end = 3 * periods.max().unwrap_or(vme::MILLISECOND);
+    let scenario = Scenario { processes: vec![everything_in_the_chassis()], ..scenario.clone() };
+    let mut listener = Listener(Accounting::new(&scenario).map_err(|error| error.to_string())?);
+    let context = Context { prefix: String::new(), variant: String::new(), record: None, scenario };
+    let run = || -> Result<Lockstep, RunError> {
+        let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
+        rack.run(end, &mut listener)?;
+        Ok(rack)
+    };
+    let rack = run().map_err(|error| error.to_string())?;
+    let programs = rack.programs();
+    let account = listener.0.close(rack.timing(), &programs);
+    Ok((programs, account))
+}
+
+struct Listener(Accounting);
+
+impl Observer for Listener {
+    fn window(&mut self, _until: Ns, _mail: &Mail, log: &Log) -> Flow {
+        self.0.window(log);
+        Flow::Continue
+    }
 }
 
 /// The process list of a run inside this process.
@@ -93,6 +124,7 @@ pub fn everything_in_the_chassis() -> Process {
 struct Witness<'a> {
     trace: Trace,
     ledger: Ledger,
+    accounting: Accounting,
     reached: Ns,
     diverged: bool,
     record_lost: bool,
@@ -102,10 +134,12 @@ struct Witness<'a> {
 }
 
 impl Observer for Witness<'_> {
-    fn window(&mut self, until: Ns, mail: &Mail, transfers: &[Transfer]) -> Flow {
+    fn window(&mut self, until: Ns, mail: &Mail, log: &Log) -> Flow {
         self.reached = until;
         self.trace.window(&mail.plant_probe, &mail.control_probe, &mail.events);
-        transfers.iter().for_each(|transfer| self.ledger.push(transfer));
+        let programs = log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program);
+        programs.for_each(|transfer| self.ledger.push(transfer));
+        self.accounting.window(log);
         self.record_lost |= mail.events.iter().any(|event| event.kind == EventKind::RecordLost as u32);
         self.diverged |= mail.plant_probe.iter().any(|probe| probe.status & drive_status::DIVERGED != 0);
         (self.progress)(until);

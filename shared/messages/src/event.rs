@@ -46,6 +46,8 @@ pub enum EventKind {
     ForceSaturated = 13,
     /// The record cannot be written any more; what follows is not recorded.
     RecordLost = 14,
+    /// The release of job `a` of task `b` found the job before still running, and the task was stopped for good.
+    OverrunTrip = 15,
 }
 
 impl EventKind {
@@ -66,6 +68,7 @@ impl EventKind {
             EventKind::MessageLost => "message-lost",
             EventKind::ForceSaturated => "force-saturated",
             EventKind::RecordLost => "record-lost",
+            EventKind::OverrunTrip => "overrun-trip",
         }
     }
 
@@ -87,6 +90,7 @@ impl EventKind {
             MessageLost,
             ForceSaturated,
             RecordLost,
+            OverrunTrip,
         ]
         .into_iter()
         .find(|kind| *kind as u32 == number)

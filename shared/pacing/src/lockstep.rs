@@ -13,11 +13,11 @@ use crate::serve::{CHASSIS_BELL, process_of};
 use crate::{Context, Power, RunError, RunFolder};
 use board::{BoardId, Mail, Ns, Op};
 use channels::{Bell, Bells, Domain, Exchange};
-use messages::{BOARDS, Grant, TransferRecord, flags};
+use messages::{BOARDS, Event, EventKind, Grant, Severity, TransferRecord, flags};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use vme::{Stop, Timing, Transfer};
+use vme::{Log, Origin, Stop, Timing};
 
 /// Longest window: bounds what a board has to keep.
 const MAX_WINDOW: Ns = 10 * vme::MILLISECOND;
@@ -41,8 +41,8 @@ pub enum Flow {
 
 /// Sees every window of a run, in order.
 pub trait Observer {
-    /// Probes and events of the window's boards, and the bus transfers whose data moved in it.
-    fn window(&mut self, until: Ns, mail: &Mail, transfers: &[Transfer]) -> Flow;
+    /// Probes and events of the window's boards, and what happened on the bus and the processors in it.
+    fn window(&mut self, until: Ns, mail: &Mail, log: &Log) -> Flow;
 }
 
 /// A rack in lock step.
@@ -57,9 +57,11 @@ pub struct Lockstep {
     bells: Option<(Bells, Bell)>,
     /// Rest of the jobs of each task, as its board last said.
     rest: Vec<Vec<Op>>,
+    /// Program and longest rest of each task that its board has asked for so far.
+    longest: Vec<[Vec<Op>; 2]>,
     board_of_task: Vec<BoardId>,
     board_of_slave: Vec<BoardId>,
-    transfers: Vec<Transfer>,
+    log: Log,
     to_board: [Vec<TransferRecord>; BOARDS.len()],
     own_mail: Mail,
     window: u64,
@@ -123,9 +125,10 @@ impl Lockstep {
             power,
             bells,
             rest: vec![Vec::new(); scenario.rack.tasks.len()],
+            longest: vec![[const { Vec::new() }; 2]; scenario.rack.tasks.len()],
             board_of_task: scenario.rack.tasks.iter().map(|task| board_named(&task.board)).collect(),
             board_of_slave: scenario.rack.slaves.iter().map(|slave| board_named(&slave.board)).collect(),
-            transfers: Vec::with_capacity(256),
+            log: Log::default(),
             to_board: Default::default(),
             own_mail: Mail::default(),
             window: 0,
@@ -152,6 +155,16 @@ impl Lockstep {
     /// Simulated time reached.
     pub fn now(&self) -> Ns {
         self.timing.now()
+    }
+
+    /// Bus and processors as they stand.
+    pub fn timing(&self) -> &Timing {
+        &self.timing
+    }
+
+    /// The longest job of each task that its board has asked for so far.
+    pub fn programs(&self) -> Vec<Vec<Op>> {
+        self.longest.iter().map(|job| job.concat()).collect()
     }
 
     fn wait_until_ready(&mut self) -> Result<(), RunError> {
@@ -222,6 +235,7 @@ impl Lockstep {
             });
         }
         self.timing.set_program(task, program);
+        self.longest[usize::from(task)][0] = program.to_vec();
         Ok(())
     }
 
@@ -234,7 +248,7 @@ impl Lockstep {
             let flow = self.step(end)?;
             let until = self.timing.now();
             let mail = self.host.read()?;
-            let flow = match observer.window(until, mail, &self.transfers) {
+            let flow = match observer.window(until, mail, &self.log) {
                 Flow::Stop => Flow::Stop,
                 Flow::Continue => flow,
             };
@@ -301,6 +315,10 @@ impl Lockstep {
             let answer = self.ask(&grant)?;
             if let Some((task, _)) = decides {
                 if let Some(rest) = answer.rest {
+                    let longest = &mut self.longest[usize::from(task)][1];
+                    if demand(&rest) > demand(longest) {
+                        longest.clone_from(&rest);
+                    }
                     self.rest[usize::from(task)] = rest;
                 }
                 self.ahead.resume(task, &self.rest[usize::from(task)]);
@@ -309,6 +327,12 @@ impl Lockstep {
                 self.set_program(board, task, &program)?;
                 self.ahead.set_program(task, &program);
             }
+        }
+        self.own_mail.clear();
+        if let Stop::Overrun { task, job } = stop {
+            self.ahead.halt(task);
+            let event = Event::new(until, EventKind::OverrunTrip, Severity::Error, job.into(), task.into());
+            self.own_mail.events.push(event);
         }
         self.record(from, until)?;
         std::mem::swap(&mut self.timing, &mut self.ahead);
@@ -319,10 +343,10 @@ impl Lockstep {
     /// Runs a copy of the timing plane to the next decision point or `limit`, and sorts the transfers by the board they are made to.
     fn look_ahead(&mut self, limit: Ns) -> Stop {
         self.ahead.clone_from(&self.timing);
-        self.transfers.clear();
-        let stop = self.ahead.advance(limit, &mut self.transfers);
+        self.log.clear();
+        let stop = self.ahead.advance(limit, &mut self.log);
         self.to_board.iter_mut().for_each(Vec::clear);
-        for transfer in &self.transfers {
+        for transfer in self.log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program) {
             if let Some(slave) = transfer.slave {
                 self.to_board[self.board_of_slave[usize::from(slave)] as usize].push(transfer.into());
             }
@@ -336,8 +360,8 @@ impl Lockstep {
 
     /// The recorder gets the window's transfers and a grant, and is not waited for.
     fn record(&mut self, from: Ns, until: Ns) -> Result<(), RunError> {
-        self.own_mail.clear();
-        self.own_mail.transfers.extend(self.transfers.iter().map(TransferRecord::from));
+        let programs = self.log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program);
+        self.own_mail.transfers.extend(programs.map(TransferRecord::from));
         self.host.send(&self.own_mail)?;
         let recorder = BoardId::BusAnalyzer;
         let Some(remote) = self.place[recorder as usize] else {
@@ -467,4 +491,10 @@ impl Lockstep {
             }
         }
     }
+}
+
+/// Processor time, then accesses: which of two programs asks for more.
+fn demand(program: &[Op]) -> (Ns, usize) {
+    let execution = program.iter().map(|op| if let Op::Exec(ns) = op { *ns } else { 0 });
+    (execution.sum(), program.iter().filter(|op| matches!(op, Op::Access(_))).count())
 }

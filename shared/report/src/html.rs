@@ -1,5 +1,10 @@
 //! `report.html`: one file that works offline, with script or without.
 
+use crate::accounting::WaterfallAccount;
+use crate::bus_rows::{
+    AGE_HEADINGS, MASTER_HEADINGS, TASK_HEADINGS, WATERFALL_HEADINGS, counts, masters, part_name, tasks,
+    waterfall,
+};
 use crate::chart::charts;
 use crate::result::RunReport;
 use crate::svg;
@@ -35,6 +40,7 @@ pub(crate) fn render(report: &RunReport) -> Result<String, String> {
         ("segments", segment_tables(report)),
         ("sweeps", sweeps(report)),
         ("latencies", latencies(report)),
+        ("bus", bus(report)),
         ("style", format!("{UPLOT_STYLE}\n{STYLE}")),
         ("uplot", format!("/*\n{UPLOT_LICENCE}\n*/\n{UPLOT}")),
         // "</" must not end the script element
@@ -203,6 +209,48 @@ fn latencies(report: &RunReport) -> String {
         }
     }
     out
+}
+
+fn bus(report: &RunReport) -> String {
+    let mut out = String::new();
+    let mut shown = None;
+    for variant in &report.variants {
+        let Some(bus) = variant.bus.as_ref().filter(|bus| shown != Some(*bus)) else {
+            continue;
+        };
+        shown = Some(bus);
+        out += &format!(
+            "<h3>{}</h3><p class=note>{}</p>{}{}{}{}{}",
+            escape(&variant.name),
+            escape(&counts(bus)),
+            waterfall_bar(&bus.waterfall),
+            table(&WATERFALL_HEADINGS, &waterfall(&bus.waterfall)),
+            table(&MASTER_HEADINGS, &masters(bus)),
+            table(&TASK_HEADINGS, &tasks(bus)),
+            table(&AGE_HEADINGS, &latency_rows(&bus.ages)),
+        );
+    }
+    out
+}
+
+/// The mean way as one bar, each part as long as its share.
+fn waterfall_bar(account: &WaterfallAccount) -> String {
+    let parts: String = account
+        .parts
+        .iter()
+        .enumerate()
+        .filter(|(_, part)| part.sum_ns > 0)
+        .map(|(i, part)| {
+            format!(
+                "<i style=\"flex:{};background:hsl({} 55% 50%)\" title=\"{} {:.3} µs\"></i>",
+                part.sum_ns,
+                50 * i,
+                part_name(part.part),
+                1e-3 * account.mean_ns(part.sum_ns)
+            )
+        })
+        .collect();
+    format!("<div style=\"display:flex;height:1.2em;max-width:60em\">{parts}</div>")
 }
 
 fn table(headings: &[&str], rows: &[Vec<String>]) -> String {

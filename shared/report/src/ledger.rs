@@ -98,7 +98,7 @@ impl PathLatency {
 }
 
 /// Three significant digits, 1 ns to 10 s.
-fn histogram() -> Histogram<u64> {
+pub(crate) fn histogram() -> Histogram<u64> {
     // constant bounds that the crate accepts
     Histogram::new_with_bounds(1, LONGEST_NS, 3).unwrap_or_else(|error| unreachable!("{error}"))
 }

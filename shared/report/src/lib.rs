@@ -5,6 +5,8 @@
 //! [`text`] for the terminal, [`RunReport::write`] for the files. A figure that does not exist (a force
 //! that never rose, a segment never reached) is `None` and shown as `–`, never a made-up number.
 
+mod accounting;
+mod bus_rows;
 mod chart;
 mod html;
 mod ideal;
@@ -18,9 +20,12 @@ pub mod text;
 mod trace;
 mod verdict;
 
+pub use accounting::{
+    Accounting, BusAccount, MasterAccount, PartAccount, Spread, TaskAccount, WaterfallAccount,
+};
 pub use ledger::{Ledger, PathLatency};
 pub use measures::RunMeasures;
 pub use result::{RunReport, SCHEMA_VERSION, Sweep, SweepPoint, VariantResult, WriteError};
 pub use segments::SegmentRow;
 pub use trace::{Ended, Trace};
-pub use verdict::{Check, Verdict};
+pub use verdict::{Check, Verdict, segments_with};

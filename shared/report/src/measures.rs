@@ -26,6 +26,12 @@ pub struct RunMeasures {
     pub self_motion_rad_per_s: Option<f64>,
     /// Least distance of a joint from its limit, rad.
     pub joint_limit_distance_rad: Option<f64>,
+    /// Share of the time for which the bus was kept.
+    pub bus_load: Option<f64>,
+    /// Releases lost by tasks whose job before still ran.
+    pub lost_releases: Option<f64>,
+    /// Longest time from what the force sensor felt to the D/A's change, s.
+    pub sensor_to_actuator_s: Option<f64>,
 }
 
 /// Data of the arm that measures compare with.
@@ -81,6 +87,13 @@ impl RunMeasures {
                 })
             }))
             .map(|least| -least),
+            bus_load: trace.bus.as_ref().map(|bus| bus.utilisation),
+            lost_releases: trace.bus.as_ref().map(|bus| bus.lost_releases() as f64),
+            sensor_to_actuator_s: trace
+                .bus
+                .as_ref()
+                .filter(|bus| bus.waterfall.jobs > 0)
+                .map(|bus| crate::trace::seconds(bus.waterfall.whole_max_ns)),
         }
     }
 
@@ -90,9 +103,13 @@ impl RunMeasures {
         match measure {
             ForceMeanErrorN => row?.mean_error_n,
             ForceRmsErrorN => row?.rms_error_n,
+            ForceTrackingErrorN => row?.tracking_error_n,
+            ForceMeanN => row?.mean_n,
+            ForceLeastN => row?.least_n,
             ForcePeakN => row?.peak_n,
             ForceRiseS => row?.rise_s,
             PositionErrorM => row?.position_error_m,
+            EncoderPositionErrorM => row?.encoder_position_error_m,
             IdealPositionDeviationM => row?.ideal_position_deviation_m,
             IdealTargetDeviationM => row?.ideal_target_deviation_m,
             FirstPeakN => self.first_peak_n,
@@ -102,6 +119,9 @@ impl RunMeasures {
             TorqueShare => self.torque_share,
             SelfMotionRadPerS => self.self_motion_rad_per_s,
             JointLimitDistanceRad => self.joint_limit_distance_rad,
+            BusLoad => self.bus_load,
+            LostReleases => self.lost_releases,
+            SensorToActuatorS => self.sensor_to_actuator_s,
         }
     }
 }
@@ -185,9 +205,12 @@ mod tests {
             mean_n: mean,
             mean_error_n: mean.map(|mean| (mean - wanted).abs()),
             rms_error_n: None,
+            tracking_error_n: None,
+            least_n: None,
             peak_n: None,
             rise_s: None,
             position_error_m: None,
+            encoder_position_error_m: None,
             ideal_position_deviation_m: None,
             ideal_target_deviation_m: None,
         }

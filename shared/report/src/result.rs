@@ -1,5 +1,6 @@
 //! Results of variants, and the report over all of them.
 
+use crate::accounting::BusAccount;
 use crate::chart::Curves;
 use crate::ideal::{Ideal, ideal};
 use crate::ledger::{Ledger, PathLatency};
@@ -8,6 +9,7 @@ use crate::segments::{SegmentRow, Signals, rows};
 use crate::series::Series;
 use crate::trace::{Ended, Trace, seconds};
 use crate::verdict::{Check, Verdict, checks};
+use messages::EventKind;
 use scenario::{Scenario, Variant};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -42,6 +44,8 @@ pub struct VariantResult {
     pub transfers: Vec<PathLatency>,
     /// Transfers that ended in BERR* or time-out.
     pub transfer_errors: u64,
+    /// Account of bus and processors, where the host made one.
+    pub bus: Option<BusAccount>,
     /// Latency measured in real time; empty in simulated time.
     pub measured: Vec<PathLatency>,
     /// File name of the record, where one was written.
@@ -73,6 +77,7 @@ impl VariantResult {
         };
         let force = plant(&|probe| probe.contact[axis]);
         let position = plant(&|probe| probe.position[axis]);
+        let encoder_position = control(&|probe| probe.x[axis]);
         let target = control(&|probe| probe.xt[axis]);
         let desired = control(&|probe| probe.xd[axis]);
         let until = match &ended {
@@ -90,6 +95,7 @@ impl VariantResult {
             &Signals {
                 force: &force,
                 position: &position,
+                encoder_position: Some(&encoder_position),
                 target: Some(&target),
                 desired: &desired,
                 ideal_position: ideal.as_ref().map(|ideal| &ideal.position),
@@ -164,6 +170,23 @@ impl VariantResult {
                 ledger.errors()
             ));
         }
+        for task in trace.bus.iter().flat_map(|bus| &bus.tasks) {
+            if task.lost_releases > 0 {
+                findings.push(format!(
+                    "task {} lost {} releases: the job before still ran",
+                    task.name, task.lost_releases
+                ));
+            }
+        }
+        let tripped = |event: &&messages::Event| event.kind == EventKind::OverrunTrip as u32;
+        for event in trace.events.iter().filter(tripped) {
+            let task = scenario.rack.tasks.get(event.b as usize);
+            findings.push(format!(
+                "task {} was stopped at {:.3} s: its job overran and its policy is to trip",
+                task.map_or("?", |task| &task.name),
+                seconds(event.t)
+            ));
+        }
         let torque = std::array::from_fn(|i| {
             control(&|probe| 100.0 * probe.torque[i] / bounds.torque_nm[i])
         });
@@ -184,6 +207,7 @@ impl VariantResult {
             checks,
             transfers: ledger.paths(),
             transfer_errors: ledger.errors(),
+            bus: trace.bus.clone(),
             measured: Vec::new(),
             record: None,
             digest: None,
@@ -231,6 +255,7 @@ fn ideal_rows(
     let signals = Signals {
         force: &ideal.force,
         position: &ideal.position,
+        encoder_position: None,
         target: None,
         desired,
         ideal_position: None,

@@ -7,6 +7,8 @@ use serde::Serialize;
 
 /// Length of the closing part over which a segment's steady figures are taken, s.
 const CLOSING_S: f64 = 1.0;
+/// Length of the opening part that the tracking error leaves out, s.
+const OPENING_S: f64 = 2.0;
 
 /// One segment of one run. A figure that does not exist is `None`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -29,6 +31,10 @@ pub struct SegmentRow {
     pub mean_error_n: Option<f64>,
     /// Rms of force − F_d over the last second, N.
     pub rms_error_n: Option<f64>,
+    /// Rms of force − F_d over all but the first 2 s, N.
+    pub tracking_error_n: Option<f64>,
+    /// Least force, N.
+    pub least_n: Option<f64>,
     /// Greatest force, N.
     pub peak_n: Option<f64>,
     /// 90 % rise time, s: from the first contact if that falls into the segment, otherwise from the
@@ -36,6 +42,8 @@ pub struct SegmentRow {
     pub rise_s: Option<f64>,
     /// |X − X_d| at the end, m, of a position-controlled one.
     pub position_error_m: Option<f64>,
+    /// The same of the X that the controller has from the encoders, m.
+    pub encoder_position_error_m: Option<f64>,
     /// Greatest |X − ideal|, m.
     pub ideal_position_deviation_m: Option<f64>,
     /// Greatest |Xᵗ − ideal|, m.
@@ -46,6 +54,8 @@ pub struct SegmentRow {
 pub(crate) struct Signals<'a> {
     pub force: &'a Series,
     pub position: &'a Series,
+    /// X as the controller has it; none for the ideal.
+    pub encoder_position: Option<&'a Series>,
     pub target: Option<&'a Series>,
     pub desired: &'a Series,
     pub ideal_position: Option<&'a Series>,
@@ -80,6 +90,17 @@ fn row(segment: &ResolvedSegment, axis: usize, signals: &Signals) -> SegmentRow 
         of.greatest(start, end, |t, y| Some((y - ideal.at(t)?).abs()))
             .filter(|_| reached)
     };
+    let rms_error = |from: f64| {
+        force
+            .mean_of(from, end, |y| (y - wanted) * (y - wanted))
+            .filter(|_| reached && force_controlled)
+            .map(f64::sqrt)
+    };
+    let position_error = |of: &Series| {
+        (reached && !force_controlled)
+            .then(|| Some((of.at(end)? - signals.desired.at(end)?).abs()))
+            .flatten()
+    };
     SegmentRow {
         name: segment.name.clone(),
         start_s: start,
@@ -91,10 +112,12 @@ fn row(segment: &ResolvedSegment, axis: usize, signals: &Signals) -> SegmentRow 
         mean_error_n: mean_n
             .filter(|_| force_controlled)
             .map(|mean| (mean - wanted).abs()),
-        rms_error_n: force
-            .mean_of(closing, end, |y| (y - wanted) * (y - wanted))
-            .filter(|_| reached && force_controlled)
-            .map(f64::sqrt),
+        rms_error_n: rms_error(closing),
+        tracking_error_n: rms_error(start + OPENING_S),
+        least_n: force
+            .greatest(start, end, |_, y| Some(-y))
+            .filter(|_| reached)
+            .map(|least| -least),
         peak_n: force
             .greatest(start, end, |_, y| Some(y))
             .filter(|_| reached),
@@ -106,9 +129,8 @@ fn row(segment: &ResolvedSegment, axis: usize, signals: &Signals) -> SegmentRow 
             signals.contact,
         )
         .filter(|_| force_controlled),
-        position_error_m: (reached && !force_controlled)
-            .then(|| Some((signals.position.at(end)? - signals.desired.at(end)?).abs()))
-            .flatten(),
+        position_error_m: position_error(signals.position),
+        encoder_position_error_m: signals.encoder_position.and_then(position_error),
         ideal_position_deviation_m: deviation(Some(signals.position)),
         ideal_target_deviation_m: deviation(signals.target),
     }

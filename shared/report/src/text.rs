@@ -1,5 +1,9 @@
 //! Tables for a terminal.
 
+use crate::accounting::BusAccount;
+use crate::bus_rows::{
+    AGE_HEADINGS, MASTER_HEADINGS, TASK_HEADINGS, WATERFALL_HEADINGS, counts, masters, tasks, waterfall,
+};
 use crate::ledger::PathLatency;
 use crate::result::{RunReport, Sweep, VariantResult};
 use crate::segments::SegmentRow;
@@ -40,6 +44,7 @@ pub fn render(report: &RunReport) -> String {
         }
     }
     let mut shown: Option<&[PathLatency]> = None;
+    let mut accounted: Option<&BusAccount> = None;
     for variant in &report.variants {
         if !variant.transfers.is_empty() && shown.is_none_or(|paths| paths != variant.transfers) {
             out += &format!(
@@ -48,6 +53,10 @@ pub fn render(report: &RunReport) -> String {
                 latencies(&variant.transfers)
             );
             shown = Some(&variant.transfers);
+        }
+        if let Some(bus) = variant.bus.as_ref().filter(|bus| accounted != Some(*bus)) {
+            out += &format!("\nbus and processors, {}\n{}", variant.name, bus_tables(bus));
+            accounted = Some(bus);
         }
         if !variant.measured.is_empty() {
             out += &format!(
@@ -61,7 +70,7 @@ pub fn render(report: &RunReport) -> String {
         let (headings, rows) = sweep_table(sweep);
         let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
         out += &format!(
-            "\nmean force of the last second over {}\n{}",
+            "\nmean and rms error of the force in the last second over {}\n{}",
             sweep.key,
             table(&headings, &rows)
         );
@@ -144,7 +153,8 @@ pub(crate) fn sweep_table(sweep: &Sweep) -> (Vec<String>, Vec<Vec<String>>) {
             .filter(|row| row.force_controlled)
             .map(|row| row.name.clone()),
     );
-    headings.extend(["first peak N".to_owned(), "ended".to_owned()]);
+    headings.extend(rows.iter().filter(|row| row.force_controlled).map(|row| format!("{} rms", row.name)));
+    headings.extend(["first peak N", "bus load %", "ended"].map(str::to_owned));
     let mut points: Vec<_> = sweep.points.iter().collect();
     let order = |name: &str| sweep.points.iter().position(|point| point.variant == name);
     points.sort_by(|a, b| {
@@ -163,7 +173,10 @@ pub(crate) fn sweep_table(sweep: &Sweep) -> (Vec<String>, Vec<Vec<String>>) {
                     .filter(|row| row.force_controlled)
                     .map(|row| number(row.mean_n, 2)),
             );
+            let forces = point.segments.iter().filter(|row| row.force_controlled);
+            row.extend(forces.map(|row| number(row.rms_error_n, 2)));
             row.push(number(point.run.first_peak_n, 1));
+            row.push(number(point.run.bus_load.map(|load| 100.0 * load), 2));
             row.push(match (&point.ended, point.run.first_contact_s) {
                 (Ended::Diverged { at_s }, _) => format!("diverged at {at_s:.2} s"),
                 (Ended::Stopped { reason, .. }, _) => reason.clone(),
@@ -174,6 +187,17 @@ pub(crate) fn sweep_table(sweep: &Sweep) -> (Vec<String>, Vec<Vec<String>>) {
         })
         .collect();
     (headings, cells)
+}
+
+fn bus_tables(bus: &BusAccount) -> String {
+    [
+        format!("{}\n", counts(bus)),
+        table(&MASTER_HEADINGS, &masters(bus)),
+        table(&TASK_HEADINGS, &tasks(bus)),
+        table(&AGE_HEADINGS, &latency_rows(&bus.ages)),
+        table(&WATERFALL_HEADINGS, &waterfall(&bus.waterfall)),
+    ]
+    .join("\n")
 }
 
 fn latencies(paths: &[PathLatency]) -> String {

@@ -1,5 +1,6 @@
 //! What a run leaves in memory for its report.
 
+use crate::accounting::BusAccount;
 use messages::{ControlProbe, Event, PlantProbe};
 use serde::Serialize;
 
@@ -12,6 +13,8 @@ pub struct Trace {
     pub control: Vec<ControlProbe>,
     /// What happened.
     pub events: Vec<Event>,
+    /// Account of bus and processors, where the host made one.
+    pub bus: Option<BusAccount>,
 }
 
 impl Trace {
@@ -21,6 +24,7 @@ impl Trace {
             plant: Vec::with_capacity(windows),
             control: Vec::with_capacity(windows),
             events: Vec::with_capacity(64),
+            bus: None,
         }
     }
 

@@ -1,6 +1,7 @@
 //! Measures against the scenario's limits.
 
 use crate::measures::RunMeasures;
+use crate::result::VariantResult;
 use crate::segments::SegmentRow;
 use crate::trace::Ended;
 use scenario::{Limit, Measure, Scenario, Variant};
@@ -42,21 +43,47 @@ fn of_segments(measure: Measure) -> bool {
         measure,
         ForceMeanErrorN
             | ForceRmsErrorN
+            | ForceTrackingErrorN
+            | ForceMeanN
+            | ForceLeastN
             | ForcePeakN
             | ForceRiseS
             | PositionErrorM
+            | EncoderPositionErrorM
             | IdealPositionDeviationM
             | IdealTargetDeviationM
     )
 }
 
 /// True where a segment of this kind has the measure.
-fn applies(measure: Measure, row: &SegmentRow) -> bool {
+fn is_of(measure: Measure, force_controlled: bool) -> bool {
     use Measure::*;
     match measure {
-        ForceMeanErrorN | ForceRmsErrorN | ForcePeakN | ForceRiseS => row.force_controlled,
-        PositionErrorM => !row.force_controlled,
+        ForceMeanErrorN | ForceRmsErrorN | ForceTrackingErrorN | ForceMeanN | ForceLeastN | ForcePeakN | ForceRiseS => {
+            force_controlled
+        }
+        PositionErrorM | EncoderPositionErrorM => !force_controlled,
         _ => true,
+    }
+}
+
+/// Names of the scenario's segments that have this measure; `None` of one that the whole run has.
+pub fn segments_with(scenario: &Scenario, measure: Measure) -> Option<Vec<String>> {
+    let axis = scenario.report.force_axis;
+    of_segments(measure).then(|| {
+        let segments = scenario.resolved_segments().into_iter();
+        segments
+            .filter(|segment| is_of(measure, segment.selection[axis] == 0))
+            .map(|segment| segment.name)
+            .collect()
+    })
+}
+
+impl VariantResult {
+    /// What a measure came to, of the whole run or of one segment; `None` where it does not exist.
+    pub fn measure(&self, measure: Measure, segment: Option<&str>) -> Option<f64> {
+        let row = segment.and_then(|name| self.segments.iter().find(|row| row.name == name));
+        self.run.value(measure, row)
     }
 }
 
@@ -84,7 +111,7 @@ pub(crate) fn checks(
             continue;
         }
         let chosen = |row: &&SegmentRow| match limit.segments.is_empty() {
-            true => applies(limit.measure, row),
+            true => is_of(limit.measure, row.force_controlled),
             false => limit.segments.contains(&row.name),
         };
         for row in rows.iter().filter(chosen) {

@@ -181,6 +181,7 @@ fn rack(scenario: &Scenario) -> Result {
             }
         }
     }
+    rack.clone().checked().map_err(|error| Problem::new("rack", error.to_string()))?;
     for card in crate::CARDS {
         if scenario.card_base(card).is_none() {
             return Err(Problem::new("rack.slaves", format!("there is no card `{card}`, and the boards need it")));

@@ -42,6 +42,7 @@ impl Document {
         document.tree = document.text.parse::<Table>().map_err(|error| {
             document.text_error("(file)", error.message(), error.span().unwrap_or(0..0))
         })?;
+        complete_rack(&mut document.tree);
         for setting in settings {
             let apply = || {
                 let (key, value) = overrides::parse(setting)?;
@@ -81,7 +82,7 @@ impl Document {
     /// This scenario with one more override.
     pub fn with(&self, key: &str, value: Value) -> Result<Document, ScenarioError> {
         let mut document = self.clone();
-        overrides::set(&mut document.tree, key, value).map_err(|problem| from_override("--vary", problem))?;
+        overrides::vary(&mut document.tree, key, value).map_err(|problem| from_override("--vary", problem))?;
         Ok(document)
     }
 
@@ -96,6 +97,7 @@ impl Document {
         for file in [&mut scenario.arm.urdf, &mut scenario.arm.drives].into_iter().flatten() {
             *file = self.folder.join(&*file).to_string_lossy().into_owned();
         }
+        preset_times(&mut scenario, tree);
         check::check(&scenario).map_err(problem)?;
         Ok(scenario)
     }
@@ -121,6 +123,38 @@ impl Document {
             message: message.trim_end().to_owned(),
             text: NamedSource::new(&self.file, self.text.clone()),
             span: SourceSpan::from(start..span.end.clamp(start, self.text.len())),
+        }
+    }
+}
+
+/// The processor card's times, where the text states none of its own.
+fn preset_times(scenario: &mut Scenario, tree: &Table) {
+    let Some(times) = scenario.controller.processor.map(|processor| processor.times()) else { return };
+    let stated = |key: &str| tree.get("controller").is_some_and(|controller| controller.get(key).is_some());
+    if !stated("execution_us") {
+        scenario.controller.execution_us = times.pipeline_ns() as f64 * 1e-3;
+    }
+    if !stated("entry_us") {
+        scenario.controller.entry_us = (times.switch_ns + times.interrupt_ns) as f64 * 1e-3;
+    }
+}
+
+/// What a scenario does not state of its rack is as in Figure 6.1.
+fn complete_rack(tree: &mut Table) {
+    let Value::Table(rack) = tree.entry("rack").or_insert_with(|| Value::Table(Table::new())) else {
+        return;
+    };
+    for (key, value) in builtin::figure_6_1_table() {
+        match (rack.get_mut(&key), value) {
+            (Some(Value::Table(stated)), Value::Table(whole)) => {
+                for (key, value) in whole {
+                    stated.entry(key).or_insert(value);
+                }
+            }
+            (Some(_), _) => {}
+            (None, value) => {
+                rack.insert(key, value);
+            }
         }
     }
 }

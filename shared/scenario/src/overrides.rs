@@ -41,13 +41,33 @@ pub fn set(root: &mut Table, key: &str, value: Value) -> Result<(), Problem> {
     }
 }
 
+/// As [`set`]; a whole number takes the place of an integer as one.
+pub fn vary(root: &mut Table, key: &str, value: Value) -> Result<(), Problem> {
+    let mut place = Some(&*root).and_then(|root| root.get(key.split('.').next()?));
+    for part in key.split('.').skip(1) {
+        place = place.and_then(|place| match place {
+            Value::Array(array) => array.get(index(array, part)?),
+            other => other.get(part),
+        });
+    }
+    let value = match (place, value) {
+        (Some(Value::Integer(_)), Value::Float(number)) if number.fract() == 0.0 => Value::Integer(number as i64),
+        (_, value) => value,
+    };
+    set(root, key, value)
+}
+
+/// An element by number or by name.
+fn index(array: &[Value], part: &str) -> Option<usize> {
+    let named = || array.iter().position(|element| element.get("name").and_then(Value::as_str) == Some(part));
+    part.parse().ok().or_else(named)
+}
+
 fn child<'a>(value: &'a mut Value, part: &str) -> Option<&'a mut Value> {
     match value {
         Value::Table(table) => Some(table.entry(part).or_insert_with(|| Value::Table(Table::new()))),
         Value::Array(array) => {
-            let index = part.parse().ok().or_else(|| {
-                array.iter().position(|element| element.get("name").and_then(Value::as_str) == Some(part))
-            })?;
+            let index = index(array, part)?;
             array.get_mut(index)
         }
         _ => None,
@@ -81,6 +101,14 @@ mod tests {
         assert_eq!(root["controller"]["kp"].as_integer(), Some(400));
         assert_eq!(root["segment"][0]["force_n"][2].as_integer(), Some(5));
         assert_eq!(root["plant"]["rate_hz"].as_float(), Some(1e4));
+    }
+
+    #[test]
+    fn a_value_that_is_varied_stays_an_integer() {
+        let mut root: Table = "[[card]]\nname = 'a'\nperiod_ns = 5".parse().expect("toml");
+        vary(&mut root, "card.a.period_ns", Value::Float(7.0)).expect("in place");
+        vary(&mut root, "card.a.ratio", Value::Float(2.0)).expect("new");
+        assert_eq!((root["card"][0]["period_ns"].as_integer(), root["card"][0]["ratio"].as_float()), (Some(7), Some(2.0)));
     }
 
     #[test]

@@ -26,14 +26,14 @@ const DAMPING: f64 = 1e-6;
 pub fn inverse_kinematics(arm: &ArmModel, target: &Pose, seed: &JointVector) -> Result<JointVector, PostureError> {
     let mut q = *seed;
     let mut error = Spatial::zeros();
-    for _ in 0..ITERATIONS {
+    for iteration in 0..ITERATIONS {
         let tip = tip_motion(arm, &q, &JointVector::zeros());
         error.fixed_rows_mut::<3>(0).copy_from(&(target.p - tip.pose.p));
         error.fixed_rows_mut::<3>(3).copy_from(&rotation::log(&(target.r * tip.pose.r.transpose())));
         if error.amax() < TOLERANCE {
             break;
         }
-        let Some(step) = newton_step(arm, &q, tip.jacobian, &error) else { break };
+        let Some(step) = newton_step(arm, &q, tip.jacobian, &error, iteration < ITERATIONS / 2) else { break };
         // a large step leaves the linear range
         q += step * (0.3 / step.amax().max(0.3));
         for i in 0..DOF {
@@ -52,15 +52,16 @@ pub fn inverse_kinematics(arm: &ArmModel, target: &Pose, seed: &JointVector) -> 
 /// Distance from a joint limit inside which self-motion turns the joint away from it, rad.
 const BUFFER: f64 = 0.15;
 
-/// Least-squares step towards the pose; in the null space, away from the joint limits. Joints that it would push
+/// Least-squares step towards the pose; in the null space, if `avoid`, away from the joint limits (close to a limit that
+/// would go on for ever, so the last steps go without). Joints that it would push
 /// beyond their limit stay out of it.
-fn newton_step(arm: &ArmModel, q: &JointVector, mut j: Jacobian, error: &Spatial) -> Option<JointVector> {
+fn newton_step(arm: &ArmModel, q: &JointVector, mut j: Jacobian, error: &Spatial, avoid: bool) -> Option<JointVector> {
     let (lower, upper) = (arm.lower_limits(), arm.upper_limits());
     for _ in 0..DOF {
         let normal: SMatrix<f64, 6, 6> = j * j.transpose() + SMatrix::identity() * DAMPING;
         let solver = normal.cholesky()?;
         let away = JointVector::from_fn(|i, _| {
-            (lower[i] + BUFFER - q[i]).max(0.0) - (q[i] - upper[i] + BUFFER).max(0.0)
+            if avoid { (lower[i] + BUFFER - q[i]).max(0.0) - (q[i] - upper[i] + BUFFER).max(0.0) } else { 0.0 }
         });
         let step: JointVector = away + j.transpose() * solver.solve(&(error - j * away));
         let outward = |i: usize| (q[i] <= lower[i] && step[i] < 0.0) || (q[i] >= upper[i] && step[i] > 0.0);

@@ -151,7 +151,8 @@ impl Waterfall {
         write: &Transfer,
     ) -> Result<Waterfall, OutOfOrder> {
         let between = write.requested.saturating_sub(read.data_at);
-        let computes = write.requested - job.execution_ns.min(between);
+        let execution = job.execution_ns - job.entry_ns;
+        let computes = write.requested - execution.min(between);
         let stamps = [
             (Part::Filter, published),
             (Part::Card, read.requested),

@@ -17,7 +17,7 @@ use crate::Ns;
 use crate::arbiter::{Mode, SLOTS};
 use crate::interrupt::IrqRelease;
 use crate::program::{Access, Direction, Op};
-use crate::rack::{Overrun, Release, Task};
+use crate::rack::{Overrun, Rack, Release, Slave, Task};
 use crate::requester::ReleasePolicy;
 use crate::timing::Timing;
 use crate::traffic::Arrivals;
@@ -306,7 +306,7 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
         }
     }
     for (i, (wire, spec)) in wiring.irqs.iter().zip(&rack.interrupters).enumerate() {
-        if wire.polled || spec.local {
+        if wire.polled || spec.local || is_silent(rack, i, programs) {
             continue;
         }
         let master = wiring.processors[wire.handler as usize].0;
@@ -341,6 +341,16 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
         });
     }
     demands
+}
+
+/// Whether nothing ever raises the interrupter.
+fn is_silent(rack: &Rack, i: usize, programs: &[Vec<Op>]) -> bool {
+    let spec = &rack.interrupters[i];
+    let raises = |op: &Op| matches!(op, Op::Raise(_));
+    let monitored = |slave: &Slave| slave.monitor.as_ref() == Some(&spec.name);
+    spec.ticks.is_none()
+        && !rack.slaves.iter().any(monitored)
+        && !programs.iter().flatten().any(raises)
 }
 
 /// The bus cycles of one interrupt's service: IACK, and the release of a RORA interrupter.
@@ -581,7 +591,7 @@ impl Analysis<'_> {
         }
         for (i, spec) in rack.interrupters.iter().enumerate() {
             let wire = &wiring.irqs[i];
-            if wire.handler != p || wire.polled {
+            if wire.handler != p || wire.polled || is_silent(rack, i, programs) {
                 continue;
             }
             let mut service_ns = rack.processors[p as usize].interrupt_ns;

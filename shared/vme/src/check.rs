@@ -205,7 +205,7 @@ impl Rack {
                 .map_or(Ok(()), |slot| seat(&traffic.name, slot))?;
         }
         for slave in &self.slaves {
-            seat(&slave.name, slave.slot)?;
+            seat(slave.card(), slave.slot)?;
         }
         Ok(slots)
     }

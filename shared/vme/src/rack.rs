@@ -78,6 +78,9 @@ impl Default for Bus {
 pub struct Slave {
     /// Card name, for example `encoder-2`.
     pub name: String,
+    /// Card that carries the window where it is none of its own: a processor card's dual-ported RAM, an adaptor's window.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub card: Option<String>,
     /// Board object that answers, for example `encoder_if`.
     pub board: String,
     /// Slot of the card, 1 to 21.
@@ -103,6 +106,11 @@ pub struct Slave {
 }
 
 impl Slave {
+    /// Name of the card in the slot.
+    pub fn card(&self) -> &str {
+        self.card.as_deref().unwrap_or(&self.name)
+    }
+
     /// Whether the window holds the first byte of the access.
     pub fn answers(&self, access: &Access) -> bool {
         cycle::single(self.am) == cycle::single(access.am)
@@ -178,6 +186,7 @@ pub enum Overrun {
     Skip,
     /// The job starts as soon as the one before has ended.
     Late,
-    /// The release is lost and [`crate::Stop::Overrun`] tells the chassis.
+    /// The release is lost and [`crate::Stop::Overrun`] tells the chassis, which stops the task for good: its
+    /// heartbeat stands still, and the output watchdog takes the torque away.
     Trip,
 }

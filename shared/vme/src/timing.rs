@@ -80,6 +80,14 @@ pub struct Log {
     pub jobs: Vec<JobRecord>,
 }
 
+impl Log {
+    /// Empties it and keeps the memory.
+    pub fn clear(&mut self) {
+        self.transfers.clear();
+        self.jobs.clear();
+    }
+}
+
 impl Sink for Log {
     fn transfer(&mut self, transfer: &Transfer) {
         self.transfers.push(*transfer);

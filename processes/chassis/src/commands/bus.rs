@@ -7,6 +7,7 @@
 pub mod show;
 mod sim;
 
+use crate::rack_run;
 use clap::{Args, Subcommand};
 
 /// The VMEbus by itself: a scenario's rack, or its arbiter under load.
@@ -43,7 +44,15 @@ fn show_scenario(name: &str) -> miette::Result<u8> {
             return Ok(2);
         }
     };
-    match show::rack(&scenario.rack, &[]) {
+    let rehearsed = rack_run::rehearse(&scenario);
+    let (programs, account) = match &rehearsed {
+        Ok((programs, account)) => (programs.as_slice(), Some(account)),
+        Err(reason) => {
+            eprintln!("warning: no bus programs: {reason}");
+            (&[][..], None)
+        }
+    };
+    match show::rack(&scenario.rack, programs, account) {
         Ok(text) => {
             print!("{text}");
             Ok(0)

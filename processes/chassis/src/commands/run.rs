@@ -3,9 +3,9 @@
 //! Exit code 0 where every limit holds, 1 where a run could not be carried out, 3 where a record is incomplete, 4 where a
 //! limit is violated.
 
+use crate::parallel::parallel;
 use crate::rack_run::{self, Finished, INTERRUPTED, Setting};
 use clap::{Args, ValueEnum};
-use crossbeam::channel;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use report::{RunReport, Sweep, SweepPoint, VariantResult, Verdict};
@@ -120,7 +120,8 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
     })
 }
 
-fn chosen(document: &Document, names: &[String]) -> miette::Result<Vec<(Variant, Scenario)>> {
+/// The variants of those names; no names: all of them.
+pub(crate) fn chosen(document: &Document, names: &[String]) -> miette::Result<Vec<(Variant, Scenario)>> {
     let mut variants = document.variants()?;
     if let Some(unknown) = names.iter().find(|name| !variants.iter().any(|(variant, _)| variant.name == **name)) {
         let known: Vec<&str> = variants.iter().map(|(variant, _)| variant.name.as_str()).collect();
@@ -157,7 +158,7 @@ fn out_folder(asked: Option<&Path>, name: &str) -> miette::Result<PathBuf> {
 }
 
 /// The first Ctrl-C or SIGTERM ends the run in order, the second one at once.
-fn end_on_signals() -> miette::Result<()> {
+pub(crate) fn end_on_signals() -> miette::Result<()> {
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         signal_hook::flag::register_conditional_shutdown(signal, 1, Arc::clone(&INTERRUPTED)).into_diagnostic()?;
         signal_hook::flag::register(signal, Arc::clone(&INTERRUPTED)).into_diagnostic()?;
@@ -220,30 +221,4 @@ fn sweeps(document: &Document, variants: &[(Variant, Scenario)]) -> miette::Resu
 
 fn point(value: f64, result: &VariantResult) -> SweepPoint {
     SweepPoint::new(value, result)
-}
-
-/// Does every job on all cores; the answers keep the jobs' order.
-fn parallel<J: Sync, A: Send>(jobs: &[J], work: impl Fn(&J) -> A + Sync) -> Vec<A> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let (give, take) = channel::unbounded();
-    let (answer, answers) = channel::unbounded();
-    for job in jobs.iter().enumerate() {
-        // the receiver lives until the end of this function
-        let _ = give.send(job);
-    }
-    drop(give);
-    std::thread::scope(|scope| {
-        for _ in 0..cores.min(jobs.len()) {
-            let (take, answer, work) = (take.clone(), answer.clone(), &work);
-            scope.spawn(move || {
-                for (i, job) in take {
-                    let _ = answer.send((i, work(job)));
-                }
-            });
-        }
-    });
-    drop(answer);
-    let mut answers: Vec<(usize, A)> = answers.into_iter().collect();
-    answers.sort_by_key(|(i, _)| *i);
-    answers.into_iter().map(|(_, answer)| answer).collect()
 }

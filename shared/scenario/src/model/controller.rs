@@ -38,6 +38,9 @@ pub struct Controller {
     pub tool_inertia_compensation: bool,
     /// Tare over this long at the start, with the tool in free space; 0 = none.
     pub tare_ms: f64,
+    /// Kind of processor card: gives `execution_us` and `entry_us` where the scenario does not state them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub processor: Option<vme::processor::Preset>,
     /// Processor time from the last read to the first D/A write.
     pub execution_us: f64,
     /// Processor time from the release to the first read (interrupt and context switch).
@@ -62,6 +65,7 @@ impl Default for Controller {
             tool_compensation: true,
             tool_inertia_compensation: false,
             tare_ms: 0.0,
+            processor: None,
             execution_us: 1500.0,
             entry_us: 130.0,
         }

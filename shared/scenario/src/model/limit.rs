@@ -33,12 +33,20 @@ pub enum Measure {
     ForceMeanErrorN,
     /// Per segment: rms of force − F_d over the last second, N.
     ForceRmsErrorN,
+    /// Per segment: rms of force − F_d over all of it but its first 2 s, N.
+    ForceTrackingErrorN,
+    /// Per segment: mean force of the last second, N.
+    ForceMeanN,
+    /// Per segment: least force, N.
+    ForceLeastN,
     /// Per segment: greatest force, N.
     ForcePeakN,
     /// Per segment: 90 % rise time from the first contact, s.
     ForceRiseS,
     /// Per segment: |X − X_d| along the report's axis at its end, m.
     PositionErrorM,
+    /// Per segment: the same of X as the controller has it from the encoders, which do not see the joints give, m.
+    EncoderPositionErrorM,
     /// Per segment: greatest |X − ideal impedance| along the report's axis, m.
     IdealPositionDeviationM,
     /// Per segment: greatest |Xᵗ − ideal impedance| along the report's axis, m.
@@ -57,4 +65,10 @@ pub enum Measure {
     SelfMotionRadPerS,
     /// Per run: least distance of a joint from its limit, rad.
     JointLimitDistanceRad,
+    /// Per run: share of the time for which somebody kept the bus.
+    BusLoad,
+    /// Per run: releases lost by tasks whose job before still ran.
+    LostReleases,
+    /// Per run: longest time from what the force sensor felt to the last D/A's change, s.
+    SensorToActuatorS,
 }

@@ -436,7 +436,10 @@ impl Timing {
         let mut transfer = asked(Origin::Program, t, master, access, self.now);
         (transfer.job, transfer.index, transfer.attempt) = (task.job, task.index, task.attempt);
         task.index = task.index.wrapping_add(1);
-        task.record.first_request.get_or_insert(self.now);
+        if task.record.first_request.is_none() {
+            task.record.first_request = Some(self.now);
+            task.record.entry_ns = task.record.execution_ns;
+        }
         let Some(accepted_ns) = posted else {
             if self.pass(p, t, &mut transfer) {
                 sink.transfer(&transfer);

@@ -30,6 +30,8 @@ pub struct JobRecord {
     pub end: Ns,
     /// Time on the processor, stalls not counted.
     pub execution_ns: Ns,
+    /// The part of it before the first access was asked for.
+    pub entry_ns: Ns,
     /// Time for which its accesses stalled the processor.
     pub stalled_ns: Ns,
 }
@@ -184,6 +186,12 @@ impl Timing {
         state.pc = 0;
         state.decided = true;
         state.state = State::Active;
+        self.reschedule(self.wiring.processor_of_task[task as usize]);
+    }
+
+    /// Stops the task where it is, for good: its card has tripped.
+    pub fn halt(&mut self, task: u16) {
+        self.tasks[task as usize].state = State::Halted;
         self.reschedule(self.wiring.processor_of_task[task as usize]);
     }
 

@@ -1,6 +1,7 @@
 //! `vmerack bus show` for people: memory map, masters, bus programs with their worst cases, and the rack
 //! drawn as text.
 
+use report::BusAccount;
 use std::fmt::{self, Display, Write};
 use vme::analysis::{self, Bounds};
 use vme::cycle::address_bits;
@@ -8,8 +9,8 @@ use vme::rack::{Rack, Release};
 use vme::{Access, Direction, Ns, Op, Program, RackError, Timing};
 
 /// All of it. `programs[t]` is what task `t` does in its longest job; a task without an entry is shown
-/// without a program, and no bounds are claimed then.
-pub fn rack(rack: &Rack, programs: &[Program]) -> Result<String, RackError> {
+/// without a program, and no bounds are claimed then. Observed maxima stand beside the bounds where there is an account.
+pub fn rack(rack: &Rack, programs: &[Program], observed: Option<&BusAccount>) -> Result<String, RackError> {
     let timing = Timing::new(rack.clone())?;
     let rack = timing.rack();
     for (t, program) in programs.iter().enumerate().take(rack.tasks.len()) {
@@ -22,7 +23,7 @@ pub fn rack(rack: &Rack, programs: &[Program]) -> Result<String, RackError> {
     let _ = drawing(&mut text, rack)
         .and_then(|()| memory_map(&mut text, rack))
         .and_then(|()| masters(&mut text, rack))
-        .and_then(|()| tasks(&mut text, rack, programs, bounds.as_ref()));
+        .and_then(|()| tasks(&mut text, rack, programs, bounds.as_ref(), observed));
     Ok(text)
 }
 
@@ -102,7 +103,13 @@ fn masters(out: &mut String, rack: &Rack) -> fmt::Result {
     Ok(())
 }
 
-fn tasks(out: &mut String, rack: &Rack, programs: &[Program], bounds: Option<&Bounds>) -> fmt::Result {
+fn tasks(
+    out: &mut String,
+    rack: &Rack,
+    programs: &[Program],
+    bounds: Option<&Bounds>,
+    observed: Option<&BusAccount>,
+) -> fmt::Result {
     for (t, task) in rack.tasks.iter().enumerate() {
         writeln!(out, "\nTask {} of {} on {}, priority {}, {}", task.name, task.board, task.processor, task.priority, released(task))?;
         let Some(program) = programs.get(t) else {
@@ -120,6 +127,11 @@ fn tasks(out: &mut String, rack: &Rack, programs: &[Program], bounds: Option<&Bo
         }
         if let Some(bounds) = bounds {
             writeln!(out, "  worst case: one access {}, the job {}", bound(bounds.access[t]), bound(bounds.response[t]))?;
+        }
+        if let Some(task) = observed.and_then(|account| account.tasks.get(t)) {
+            write!(out, "  observed:   one access {} ns, the job {} ns", task.access_max_ns, task.response_max_ns)?;
+            write!(out, "; {:.1} accesses keep the bus for {:.3} µs a job", task.accesses_per_job, 1e-3 * task.bus_per_job_ns)?;
+            writeln!(out, "; {} jobs, {} lost releases", task.jobs, task.lost_releases)?;
         }
     }
     Ok(())
@@ -160,7 +172,7 @@ mod tests {
     #[test]
     fn every_card_of_figure_6_1_stands_in_the_drawing_and_in_the_memory_map() {
         let rack = figure_6_1();
-        let text = super::rack(&rack, &[]).unwrap();
+        let text = super::rack(&rack, &[], None).unwrap();
         for slave in &rack.slaves {
             let line = text.lines().find(|line| line.ends_with(&format!("  {}", slave.name)));
             assert!(line.is_some_and(|line| line.contains(&format!("{:#x}", slave.base))), "{}\n{text}", slave.name);
@@ -175,7 +187,7 @@ mod tests {
         let read = Access { am: slave.am, addr: slave.base, width: Width::D16, dir: Direction::Read, n: 1 };
         let mut programs = vec![Program::new(); rack.tasks.len()];
         programs[0] = vec![Op::Exec(500), Op::Access(read), Op::Decide];
-        let text = super::rack(&rack, &programs).unwrap();
+        let text = super::rack(&rack, &programs, None).unwrap();
         assert!(text.contains(&format!("read D16 × 1 at {:#x} ({})", slave.base, slave.name)), "{text}");
         assert!(text.contains("worst case: one access") && !text.contains("the job none"), "{text}");
     }
@@ -184,7 +196,7 @@ mod tests {
     fn a_program_that_no_board_answers_is_refused() {
         let rack = figure_6_1();
         let miss = Access { am: 0x3D, addr: 0xFF_0000, width: Width::D16, dir: Direction::Read, n: 1 };
-        let error = super::rack(&rack, &[vec![Op::Access(miss)]]).unwrap_err();
+        let error = super::rack(&rack, &[vec![Op::Access(miss)]], None).unwrap_err();
         assert!(matches!(error, RackError::NoSlave { addr: 0xFF_0000, .. }), "{error}");
     }
 }

@@ -10,6 +10,7 @@
 
 #![warn(missing_docs)]
 
+mod affinity;
 mod error;
 mod holdback;
 mod host;

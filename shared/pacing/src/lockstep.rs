@@ -5,6 +5,7 @@
 //! that instant); force sensor and encoders answer the reads made to them at *their* times; the board that decides at D is
 //! stepped with the values read. The recorder gets the same grants one way, with credit.
 
+use crate::affinity::OneProcessor;
 use crate::error::at;
 use crate::host::{Answer, Factory, Host};
 use crate::remote::{READY, Remote};
@@ -68,6 +69,7 @@ pub struct Lockstep {
     window: u64,
     recorder_owes: u32,
     interrupted: &'static AtomicBool,
+    _processor: Option<OneProcessor>,
     // last: it removes the folder once nobody uses it
     _folder: Option<RunFolder>,
 }
@@ -104,10 +106,15 @@ impl Lockstep {
         }
         let exchange = Exchange::open(&here, domain.as_ref(), |board| place[board as usize])?;
         let host = Host::new(&here, exchange, &context, factory)?;
+        let processor = folder.as_ref().and_then(|_| OneProcessor::stay());
         if let Some(folder) = &folder {
             for i in &away {
                 let process = &scenario.processes[*i];
-                power.spawn(&process.name, &programs(process), &folder.path)?;
+                let pid = power.spawn(&process.name, &programs(process), &folder.path)?;
+                let records = process.boards.iter().any(|board| board == BoardId::BusAnalyzer.name());
+                if let Some(processor) = processor.as_ref().filter(|_| records) {
+                    processor.release(pid);
+                }
             }
         }
         let board_named = |name: &str| BoardId::from_name(name).unwrap_or(BoardId::Chassis);
@@ -129,6 +136,7 @@ impl Lockstep {
             window: 0,
             recorder_owes: 0,
             interrupted,
+            _processor: processor,
             _folder: folder,
         };
         rack.wait_until_ready()?;

@@ -21,8 +21,8 @@ pub struct Power {
 }
 
 impl Power {
-    /// Starts one process: `command` with the run folder and its own name appended.
-    pub fn spawn(&mut self, name: &str, command: &[String], folder: &Path) -> Result<(), RunError> {
+    /// Starts one process: `command` with the run folder and its own name appended. Returns its number.
+    pub fn spawn(&mut self, name: &str, command: &[String], folder: &Path) -> Result<u32, RunError> {
         let program = command.first().cloned().unwrap_or_default();
         let failed = |error: std::io::Error| RunError::Spawn {
             process: name.to_owned(),
@@ -42,8 +42,9 @@ impl Power {
             .process_group(0)
             .spawn()
             .map_err(failed)?;
+        let pid = child.id();
         self.children.push((name.to_owned(), child));
-        Ok(())
+        Ok(pid)
     }
 
     /// Process numbers, in the order of starting.

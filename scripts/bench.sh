@@ -1,0 +1,81 @@
+#!/usr/bin/env bash
+# Speed and size of the rack, with the machine's conditions. Wall-clock figures of a shared machine: compare within one
+# run. ./scripts/bench.sh [--outside] — with --outside also Pinocchio and MuJoCo (needs their PyPI packages).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+source scripts/setup.sh
+cargo build --release --workspace --bins --examples --quiet
+release="${CARGO_TARGET_DIR:-target}/release"
+out=$(mktemp -d)
+hogs=()
+end() {
+    ((${#hogs[@]})) && kill "${hogs[@]}" 2>/dev/null
+    rm -rf "$out"
+}
+trap end EXIT
+
+echo "machine: $(uname -sr), $(nproc) cores, $(sed -n 's/^model name\t*: //p' /proc/cpuinfo | head -n 1), load $(cut -d' ' -f1-3 /proc/loadavg)"
+
+# wall time of the windows of Table 5-3, one variant, best of five, and how many times faster than real time
+rack() {
+    local name=$1 best=
+    shift
+    for _ in 1 2 3 4 5; do
+        "$release/vmerack" run table-5-3 --variant modified --set 'report.sweep=[]' --out "$out" --json "$@" >"$out/stdout.json" || true
+        local wall
+        wall=$(sed -n 's/^ *"wall_s": \([0-9.]*\),*$/\1/p' "$out/stdout.json" | head -n 1)
+        best=$(awk -v a="$wall" -v b="${best:-$wall}" 'BEGIN { print a < b ? a : b }')
+    done
+    awk -v n="$name" -v w="$best" 'BEGIN { printf "%-44s %8.3f s %8.1f x real time\n", n, w, 13 / w }'
+}
+racks() {
+    rack "in one process, recording off$1" --in-process --no-record
+    rack "in one process, recording on$1" --in-process
+    rack "lock step across processes, recording on$1"
+}
+
+echo
+echo "Table 5-3, one variant, 13 s, start-up excluded, best of five"
+racks ""
+for _ in 1 2; do
+    (while :; do :; done) &
+    hogs+=($!)
+done
+racks ", two hogs"
+kill "${hogs[@]}"
+hogs=()
+
+echo
+echo "whole command, 0.005 s of simulated time, seconds of wall time (start-up, report and shut-down)"
+for _ in 1 2 3; do
+    start=$(date +%s.%N)
+    "$release/vmerack" run table-5-3 --variant modified --set 'report.sweep=[]' --duration 0.005 --out "$out" --json >/dev/null || true
+    awk -v a="$start" -v b="$(date +%s.%N)" 'BEGIN { printf "%.3f\n", b - a }'
+done
+
+echo
+echo "greatest resident size of each process, MB"
+"$release/vmerack" run table-5-3 --variant modified --set 'report.sweep=[]' --duration 60 --out "$out" --json >/dev/null 2>&1 &
+rack=$!
+sleep 1
+for pid in $rack $(pgrep -P "$rack"); do
+    awk -v n="$(cat "/proc/$pid/comm")" '/VmHWM/ { printf "%-20s %6.1f\n", n, $2 / 1024 }' "/proc/$pid/status"
+done
+kill -INT "$rack"
+wait "$rack" || true
+
+echo
+echo "one control step (FK, J, J̇q̇, AHIC, ERC, RR, inverse dynamics)"
+"$release/examples/control_step"
+echo
+echo "one hop, 256 bytes, between two processes"
+"$release/examples/hop"
+echo
+echo "integration of the plant"
+"$release/examples/integrators"
+if [ "${1:-}" = --outside ]; then
+    echo
+    echo "arm algorithms, ns a call"
+    cargo bench --quiet -p arm --bench algorithms
+    python3 scripts/reference/bench_outside.py
+fi

@@ -56,6 +56,9 @@ enum Pacing {
 
 /// Runs the command and returns its exit code.
 pub fn run(args: RunArgs) -> miette::Result<u8> {
+    if args.pacing == Pacing::Realtime {
+        return Err(miette!("--pacing realtime is not built yet; lock step across processes and --in-process are"));
+    }
     let mut overrides = args.set.clone();
     overrides.extend(args.seed.map(|seed| format!("seed={seed}")));
     overrides.extend(args.duration.map(|seconds| format!("duration_s={seconds:?}")));
@@ -98,11 +101,7 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
     }
     let sweeps = if failed { Vec::new() } else { sweeps(&document, &variants)? };
 
-    let pacing = match (args.pacing, args.in_process) {
-        (Pacing::Realtime, _) => "real time across processes",
-        (Pacing::Lockstep, false) => "lock step across processes",
-        (Pacing::Lockstep, true) => "lock step in one process",
-    };
+    let pacing = if args.in_process { "lock step in one process" } else { "lock step across processes" };
     let base = document.scenario()?;
     let report = RunReport::new(&document.name, &base, pacing, results, sweeps);
     report.write(&folder).map_err(|error| miette!("{error}"))?;

@@ -120,6 +120,7 @@ impl TransferRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use vme::program::Origin;
 
     #[test]
     fn a_transfer_keeps_its_access_as_plain_old_data() {
@@ -135,6 +136,11 @@ mod tests {
             data_at: 6,
             done: 7,
             status: Status::BusError,
+            origin: Origin::Program,
+            master: 0,
+            held_ns: 0,
+            posted: false,
+            attempt: 0,
         };
         let record = TransferRecord::from(&transfer);
         assert_eq!(record.access(), access);

@@ -40,7 +40,8 @@ pub(crate) fn processes_with(tmpdir: &Path) -> Vec<Process> {
 /// The name behind `--process`, where there is one.
 fn name_of(pid: u32) -> String {
     let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-    let words: Vec<String> = line.split(|byte| *byte == 0).map(|word| String::from_utf8_lossy(word).into_owned()).collect();
+    let words: Vec<String> =
+        line.split(|byte| *byte == 0).map(|word| String::from_utf8_lossy(word).into_owned()).collect();
     let name = words.iter().position(|word| word == "--process").and_then(|i| words.get(i + 1));
     name.cloned().unwrap_or_else(|| "vmerack".into())
 }
@@ -48,7 +49,8 @@ fn name_of(pid: u32) -> String {
 /// Entries of the folder, sorted; empty where there is none.
 pub(crate) fn entries(folder: &Path) -> Vec<String> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
-    let mut names: Vec<String> = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    let mut names: Vec<String> =
+        entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
     names.sort();
     names
 }

@@ -17,7 +17,11 @@ pub fn target_folder() -> PathBuf {
 /// A built program of the workspace.
 pub fn program(name: &str) -> PathBuf {
     let path = profile_folder().join(name);
-    assert!(path.exists(), "{} is missing: run scripts/test.sh, or `cargo build --workspace --bins` first", path.display());
+    assert!(
+        path.exists(),
+        "{} is missing: run scripts/test.sh, or `cargo build --workspace --bins` first",
+        path.display()
+    );
     path
 }
 

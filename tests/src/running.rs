@@ -140,8 +140,10 @@ impl Running {
     }
 
     fn left(&self) -> Vec<String> {
-        let processes = self.processes().into_iter().map(|process| format!("process {} ({})", process.name, process.pid));
-        let files = machine::entries(&self.temporary).into_iter().map(|name| self.temporary.join(name).display().to_string());
+        let processes =
+            self.processes().into_iter().map(|process| format!("process {} ({})", process.name, process.pid));
+        let files =
+            machine::entries(&self.temporary).into_iter().map(|name| self.temporary.join(name).display().to_string());
         let shared = machine::entries(Path::new("/dev/shm"))
             .into_iter()
             .filter(|name| self.folders.iter().any(|folder| name.contains(folder.as_str())))
@@ -159,7 +161,9 @@ impl Running {
     }
 
     fn join(&mut self) -> [String; 2] {
-        self.output.take().map_or_else(Default::default, |readers| readers.map(|reader| reader.join().unwrap_or_default()))
+        self.output
+            .take()
+            .map_or_else(Default::default, |readers| readers.map(|reader| reader.join().unwrap_or_default()))
     }
 }
 

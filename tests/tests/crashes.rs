@@ -7,6 +7,9 @@
 use rack_tests::{Bench, Draw, Outcome, Running, Signal, signal};
 use std::time::Duration;
 
+/// Where the runs record.
+const RECORD: &str = "out/nominal.mcap";
+
 const PROCESSES: [&str; 7] =
     ["hw_sim", "da_io", "force_sensor_if", "encoder_if", "control_computer", "workstation", "bus_analyzer"];
 
@@ -26,16 +29,31 @@ fn drawn_delay(draw: &mut Draw) -> Duration {
 /// The simulated time in a message.
 fn simulated_s(message: &str) -> f64 {
     let (_, rest) = message.split_once("simulated time ").unwrap_or_else(|| panic!("no simulated time in: {message}"));
-    rest.split_whitespace().next().and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("no number in: {message}"))
+    rest.split_whitespace()
+        .next()
+        .and_then(|number| number.parse().ok())
+        .unwrap_or_else(|| panic!("no number in: {message}"))
 }
 
 /// Time of the last message of the record, which must be whole.
 fn recorded_s(bench: &Bench) -> f64 {
-    let record = "out/nominal.mcap";
+    let record = RECORD;
     bench.digest_of(record);
     let outcome = bench.run(&["log", "recover", record, "-o", "whole.mcap"]).expect_code(0);
     let (_, rest) = outcome.stdout.split_once("up to ").unwrap_or_else(|| panic!("{}", outcome.stdout));
-    rest.split_whitespace().next().and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("{}", outcome.stdout))
+    rest.split_whitespace()
+        .next()
+        .and_then(|number| number.parse().ok())
+        .unwrap_or_else(|| panic!("{}", outcome.stdout))
+}
+
+/// Waits until some chunks of the record are on disk, however slow the machine is; the run's watchdog is the limit.
+fn wait_for_record(bench: &Bench) {
+    let begun = std::time::Instant::now();
+    let size = || std::fs::metadata(bench.path(RECORD)).map_or(0, |file| file.len());
+    while size() < 300_000 && begun.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
 }
 
 fn expect_failure_of(outcome: Outcome, process: &str) -> Outcome {
@@ -117,6 +135,9 @@ fn a_killed_chassis_leaves_a_whole_record_and_nothing_else() {
     for delay in [0, 900] {
         let bench = Bench::new();
         let mut run = start(&bench, Duration::from_millis(delay));
+        if delay > 0 {
+            wait_for_record(&bench);
+        }
         run.mark();
         signal(run.pid(), Signal::KILL);
         let outcome = run.wait().expect_nothing_left();
@@ -132,7 +153,8 @@ fn a_finished_run_leaves_its_results_and_nothing_else() {
     let bench = Bench::new();
     let scenario = bench.scenario("short.toml", &[]);
     bench.run(&["run", scenario, "--duration", "0.2", "--out", "out"]).expect_code(0).expect_nothing_left();
-    let mut files: Vec<_> = std::fs::read_dir(bench.path("out")).expect("results").flatten().map(|file| file.file_name()).collect();
+    let mut files: Vec<_> =
+        std::fs::read_dir(bench.path("out")).expect("results").flatten().map(|file| file.file_name()).collect();
     files.sort();
     assert_eq!(files, ["nominal.mcap", "report.html", "report.json"]);
 }

@@ -14,7 +14,10 @@ const SECONDS: f64 = 1.4;
 fn processes(list: &[(String, Vec<&str>)]) -> Value {
     let process = |(name, boards): &(String, Vec<&str>)| {
         let boards = boards.iter().map(|board| Value::from(*board)).collect();
-        Value::Table(Table::from_iter([("name".into(), Value::from(name.as_str())), ("boards".into(), Value::Array(boards))]))
+        Value::Table(Table::from_iter([
+            ("name".into(), Value::from(name.as_str())),
+            ("boards".into(), Value::Array(boards)),
+        ]))
     };
     Value::Array(list.iter().map(process).collect())
 }
@@ -100,7 +103,8 @@ fn two_runs_side_by_side_record_what_each_records_alone() {
     let alone = ["1", "2"].map(|seed| bench.digest(scenario, SECONDS, &["--seed", seed]));
     // of one user in one TMPDIR
     let seconds = SECONDS.to_string();
-    let together = ["1", "2"].map(|seed| bench.start(&["run", scenario, "--seed", seed, "--duration", &seconds, "--out", seed]));
+    let together =
+        ["1", "2"].map(|seed| bench.start(&["run", scenario, "--seed", seed, "--duration", &seconds, "--out", seed]));
     // each waits until nothing of either is left
     for run in together {
         run.wait().expect_code(0).expect_nothing_left();

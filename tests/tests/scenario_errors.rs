@@ -136,7 +136,8 @@ fn a_bad_override_is_refused() {
 #[test]
 fn an_inertia_that_no_body_has_is_refused() {
     let bench = Bench::new();
-    let urdf = std::fs::read_to_string(workspace().join("shared/arm/src/robots/rediestro.urdf")).expect("the built-in arm");
+    let urdf =
+        std::fs::read_to_string(workspace().join("shared/arm/src/robots/rediestro.urdf")).expect("the built-in arm");
     // the last body's moment about x is negative
     let place = urdf.rfind("ixx=\"").expect("inertia") + "ixx=\"".len();
     let (before, after) = urdf.split_at(place);

@@ -15,7 +15,12 @@ fn first_peaks(overrides: &[&str]) -> Vec<f64> {
     // a limit that is meant for other settings may be violated here
     let outcome = Bench::new().run(&[&run[..], &variants, &settings].concat());
     let report: Value = serde_json::from_str(&outcome.stdout).unwrap_or_else(|error| panic!("{error}: {outcome:?}"));
-    report["variants"].as_array().expect("variants").iter().map(|variant| number(&variant["run"], "first_peak_n")).collect()
+    report["variants"]
+        .as_array()
+        .expect("variants")
+        .iter()
+        .map(|variant| number(&variant["run"], "first_peak_n"))
+        .collect()
 }
 
 #[test]
@@ -66,7 +71,8 @@ fn friction_defeats_the_original_scheme_and_not_the_modified_one() {
     assert!(worst(&modified) < 10.0, "{modified:?}");
     assert!(modified[1] > modified[0] && modified[0] > modified[2] && modified[2] > modified[3], "{modified:?}");
     let original = means("original");
-    let incapable = original.iter().zip(wanted).filter(|(mean, force)| *force > 0.0 && (*mean - force).abs() > force / 2.0);
+    let incapable =
+        original.iter().zip(wanted).filter(|(mean, force)| *force > 0.0 && (*mean - force).abs() > force / 2.0);
     assert!(incapable.count() >= 2, "{original:?}");
 }
 

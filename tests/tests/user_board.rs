@@ -51,7 +51,8 @@ fn a_users_board_holds_the_arm_and_its_runs_repeat_to_the_bit() {
     let scenario = bench.scenario("mine.toml", &[("process", processes)]);
     assert_eq!(bench.digest(scenario, 1.0, &[]), bench.digest(scenario, 1.0, &[]));
 
-    let outcome = bench.run(&["run", scenario, "--duration", "1", "--json", "--out", "out"]).expect_code(0).expect_nothing_left();
+    let outcome =
+        bench.run(&["run", scenario, "--duration", "1", "--json", "--out", "out"]).expect_code(0).expect_nothing_left();
     let report: Json = serde_json::from_str(&outcome.stdout).expect("JSON");
     let off = report["variants"][0]["segments"][0]["position_error_m"].as_f64();
     // the first segment holds the start pose; the user's controller sends no probe of its own

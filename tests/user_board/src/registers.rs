@@ -23,7 +23,8 @@ impl Registers {
         let (mut reads, mut writes) = (Vec::new(), vec![io + parallel::ENABLE]);
         for joint in 0..JOINTS {
             let channel = joint % encoder::CHANNELS_PER_CARD;
-            let card = base(format!("encoder-{}", joint / encoder::CHANNELS_PER_CARD + 1))? + encoder::CHANNEL * channel as u32;
+            let card = base(format!("encoder-{}", joint / encoder::CHANNELS_PER_CARD + 1))?
+                + encoder::CHANNEL * channel as u32;
             reads.extend([card + encoder::COUNT, card + encoder::VELOCITY]);
             let card = base(format!("da-{}", joint / da::CHANNELS_PER_CARD + 1))?;
             writes.push(card + da::code((joint % da::CHANNELS_PER_CARD) as u32));

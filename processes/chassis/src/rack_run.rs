@@ -3,7 +3,7 @@
 use crate::boards;
 use board::{Mail, Ns};
 use messages::{EventKind, drive_status};
-use pacing::{Context, Flow, Lockstep, Observer, RunError};
+use pacing::{Context, Flow, Lockstep, Measured, Observer, Realtime, RunError};
 use report::{Accounting, BusAccount, Ended, Ledger, Trace, VariantResult};
 use scenario::{Process, Scenario, Variant};
 use std::path::PathBuf;
@@ -15,9 +15,21 @@ use vme::{Log, Origin, Program};
 /// Set by Ctrl-C; every run of this process ends soon after.
 pub static INTERRUPTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
+/// How time goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pacing {
+    /// Simulated time, as fast as the machine allows.
+    #[default]
+    Lockstep,
+    /// Wall clock.
+    Realtime,
+}
+
 /// What a run needs to know beside its scenario.
 #[derive(Clone, Debug, Default)]
 pub struct Setting {
+    /// How time goes.
+    pub pacing: Pacing,
     /// Every board in the chassis.
     pub in_process: bool,
     /// Record to write; none = recording off.
@@ -58,7 +70,10 @@ pub fn run(
         start,
         progress,
     };
-    let error = carry_out(scenario, variant, setting, &mut witness).err();
+    let (measured, error) = match carry_out(scenario, variant, setting, &mut witness) {
+        Ok(measured) => (measured, None),
+        Err(error) => (Vec::new(), Some(error)),
+    };
     let windows = start.elapsed().saturating_sub(witness.start_up);
     let at_s = witness.reached as f64 * 1e-9;
     let ended = match &error {
@@ -67,23 +82,46 @@ pub fn run(
         None => Ended::Completed,
     };
     let mut result = VariantResult::new(scenario, variant, &witness.trace, &witness.ledger, ended, at_s)?;
+    for path in measured.into_iter().filter(|path| path.n > 0) {
+        let Measured { path, n, late, min_ns, p50_ns, p99_ns, max_ns } = path;
+        let path = if late > 0 { format!("{path} ({late} late)") } else { path };
+        result.measured.push(report::PathLatency { path, n, min_ns, p50_ns, p99_ns, max_ns });
+    }
     result.wall_s = Some(windows.as_secs_f64());
     Ok(Finished { result, error, record_lost: witness.record_lost, start_up: witness.start_up, windows })
 }
 
-fn carry_out(scenario: &Scenario, variant: &Variant, setting: &Setting, witness: &mut Witness<'_>) -> Result<(), RunError> {
+fn carry_out(
+    scenario: &Scenario,
+    variant: &Variant,
+    setting: &Setting,
+    witness: &mut Witness<'_>,
+) -> Result<Vec<Measured>, RunError> {
     let mut scenario = scenario.clone();
     if setting.in_process {
         scenario.processes = vec![everything_in_the_chassis()];
     }
     let end = scenario.duration_ns();
     let context = Context { prefix: String::new(), variant: variant.name.clone(), record: setting.record.clone(), scenario };
-    let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
-    witness.start_up = witness.start.elapsed();
-    let ran = rack.run(end, witness);
-    witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
-    ran?;
-    rack.finish()
+    match setting.pacing {
+        Pacing::Lockstep => {
+            let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
+            witness.start_up = witness.start.elapsed();
+            let ran = rack.run(end, witness);
+            witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
+            ran?;
+            rack.finish()?;
+            Ok(Vec::new())
+        }
+        Pacing::Realtime => {
+            let mut rack = Realtime::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
+            witness.start_up = witness.start.elapsed();
+            let ran = rack.run(end, witness);
+            witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
+            ran?;
+            rack.finish()
+        }
+    }
 }
 
 /// Runs the start of a scenario in this process, three periods of its slowest task, and returns the longest job of each

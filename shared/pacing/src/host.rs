@@ -48,8 +48,27 @@ impl Host {
         Ok(Host { boards, exchange, inboxes: Box::default(), inputs: Inputs::default(), outputs: Outputs::default() })
     }
 
-    /// Steps the board that the grant names.
+    /// Takes in the mail of the board that the grant names and steps it.
     pub fn step(&mut self, grant: &Grant, transfers: &[TransferRecord]) -> Result<Answer, RunError> {
+        if let Some(id) = BoardId::from_number(grant.board as u8) {
+            self.fetch(id, 0)?;
+        }
+        self.act(grant, transfers)
+    }
+
+    /// Takes in the mail of a board that has acted up to `stepped_to`.
+    pub(crate) fn fetch(&mut self, board: BoardId, stepped_to: Ns) -> Result<&mut Mail, RunError> {
+        self.exchange.fetch(board, stepped_to, &mut self.inboxes)?;
+        Ok(&mut self.inboxes[board as usize])
+    }
+
+    /// The channels of this process.
+    pub(crate) fn exchange(&mut self) -> &mut Exchange {
+        &mut self.exchange
+    }
+
+    /// Steps the board that the grant names with the mail taken in.
+    pub(crate) fn act(&mut self, grant: &Grant, transfers: &[TransferRecord]) -> Result<Answer, RunError> {
         let id = BoardId::from_number(grant.board as u8).filter(|id| self.boards.iter().any(|(known, _)| known == id));
         let Some(id) = id else {
             return Err(RunError::BadAnswer {
@@ -58,7 +77,6 @@ impl Host {
                 when: crate::error::at(grant.until),
             });
         };
-        self.exchange.fetch(id, 0, &mut self.inboxes)?;
         let inputs = &mut self.inputs;
         inputs.from = grant.from;
         inputs.until = grant.until;

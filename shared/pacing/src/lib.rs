@@ -2,6 +2,7 @@
 //! and the life and death of the processes of a run.
 //!
 //! * [`Lockstep`] runs the windows: timing plane, then the boards in the order of the signal path.
+//! * [`Realtime`] runs the same windows by the wall clock, peer to peer.
 //! * [`Host`] steps the boards of one process; [`serve`] is the whole `main` of a board's process.
 //! * [`RunFolder`] and [`Power`]: what a run leaves on the machine, and how it goes away again.
 //!
@@ -16,6 +17,7 @@ mod holdback;
 mod host;
 mod lockstep;
 mod power;
+mod realtime;
 mod remote;
 mod run_folder;
 mod serve;
@@ -24,5 +26,6 @@ pub use error::RunError;
 pub use host::{Answer, Factory, Host};
 pub use lockstep::{Flow, Lockstep, Observer};
 pub use power::Power;
+pub use realtime::{Measured, Realtime};
 pub use run_folder::{Context, RunFolder, clean_stale};
 pub use serve::serve;

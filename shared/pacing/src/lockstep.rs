@@ -26,7 +26,7 @@ const RECORDER_CREDIT: u32 = 64;
 /// How often a wait looks whether everybody still lives.
 const WATCH_PERIOD: Duration = Duration::from_millis(50);
 /// No answer for this long and no sign of life: stalled.
-const STALL: Duration = Duration::from_secs(5);
+pub(crate) const STALL: Duration = Duration::from_secs(5);
 /// Processor time that no single answer takes.
 const SPIN_S: u64 = 5;
 /// Processes get this long to report ready.
@@ -49,27 +49,27 @@ pub trait Observer {
 
 /// A rack in lock step.
 pub struct Lockstep {
-    timing: Timing,
+    pub(crate) timing: Timing,
     ahead: Timing,
-    host: Host,
-    remotes: Vec<Remote>,
+    pub(crate) host: Host,
+    pub(crate) remotes: Vec<Remote>,
     /// Index in `remotes` of each board's process; `None` = here.
-    place: [Option<usize>; BOARDS.len()],
-    power: Power,
-    bells: Option<(Bells, Bell)>,
+    pub(crate) place: [Option<usize>; BOARDS.len()],
+    pub(crate) power: Power,
+    pub(crate) bells: Option<(Bells, Bell)>,
     /// Rest of the jobs of each task, as its board last said.
     rest: Vec<Vec<Op>>,
     /// Program and longest rest of each task that its board has asked for so far.
     longest: Vec<[Vec<Op>; 2]>,
-    board_of_task: Vec<BoardId>,
-    board_of_slave: Vec<BoardId>,
+    pub(crate) board_of_task: Vec<BoardId>,
+    pub(crate) board_of_slave: Vec<BoardId>,
     log: Log,
-    to_board: [Vec<TransferRecord>; BOARDS.len()],
+    pub(crate) to_board: [Vec<TransferRecord>; BOARDS.len()],
     own_mail: Mail,
-    window: u64,
+    pub(crate) window: u64,
     recorder_owes: u32,
     interrupted: &'static AtomicBool,
-    _processor: Option<OneProcessor>,
+    pub(crate) processor_kept: Option<OneProcessor>,
     // last: it removes the folder once nobody uses it
     _folder: Option<RunFolder>,
 }
@@ -136,7 +136,7 @@ impl Lockstep {
             window: 0,
             recorder_owes: 0,
             interrupted,
-            _processor: processor,
+            processor_kept: processor,
             _folder: folder,
         };
         rack.wait_until_ready()?;
@@ -207,7 +207,7 @@ impl Lockstep {
         Ok(())
     }
 
-    fn watch(&mut self) -> Result<(), RunError> {
+    pub(crate) fn watch(&mut self) -> Result<(), RunError> {
         if self.interrupted.load(Ordering::Relaxed) {
             return Err(RunError::Interrupted { when: at(self.timing.now()) });
         }
@@ -228,7 +228,7 @@ impl Lockstep {
         Ok(())
     }
 
-    fn set_program(&mut self, board: BoardId, task: u16, program: &[Op]) -> Result<(), RunError> {
+    pub(crate) fn set_program(&mut self, board: BoardId, task: u16, program: &[Op]) -> Result<(), RunError> {
         if self.board_of_task.get(usize::from(task)) != Some(&board) {
             return Err(RunError::BadAnswer {
                 board: board.name(),
@@ -239,6 +239,15 @@ impl Lockstep {
         self.timing.set_program(task, program);
         self.longest[usize::from(task)][0] = program.to_vec();
         Ok(())
+    }
+
+    /// Remembers the longest rest that a task's board has asked for.
+    pub(crate) fn note_rest(&mut self, task: u16, rest: &[Op]) {
+        let longest = &mut self.longest[usize::from(task)][1];
+        if demand(rest) > demand(longest) {
+            longest.clear();
+            longest.extend_from_slice(rest);
+        }
     }
 
     /// Runs to `end`, or until the observer stops the run.
@@ -318,10 +327,7 @@ impl Lockstep {
             self.expect_no_early(board, &answer)?;
             if let Some((task, _)) = decides {
                 if let Some(rest) = answer.rest {
-                    let longest = &mut self.longest[usize::from(task)][1];
-                    if demand(&rest) > demand(longest) {
-                        longest.clone_from(&rest);
-                    }
+                    self.note_rest(task, &rest);
                     self.rest[usize::from(task)] = rest;
                 }
                 self.ahead.resume(task, &self.rest[usize::from(task)]);
@@ -357,7 +363,7 @@ impl Lockstep {
         stop
     }
 
-    fn grant_of(&self, board: BoardId, from: Ns, until: Ns, flags: u32) -> Grant {
+    pub(crate) fn grant_of(&self, board: BoardId, from: Ns, until: Ns, flags: u32) -> Grant {
         Grant { window: self.window, from, until, board: board as u32, flags, task: 0, job: 0 }
     }
 
@@ -434,7 +440,7 @@ impl Lockstep {
         }
     }
 
-    fn send_grant(&mut self, remote: usize, grant: &Grant) -> Result<(), RunError> {
+    pub(crate) fn send_grant(&mut self, remote: usize, grant: &Grant) -> Result<(), RunError> {
         let sent = self.remotes[remote].grant(grant, &self.to_board[grant.board as usize]);
         if sent.is_err() {
             // a process that has just died is the better explanation
@@ -493,7 +499,12 @@ impl Lockstep {
                 waiting = None;
                 continue;
             };
-            return Err(RunError::Stalled { process: name.clone(), how, waited_s: asked.elapsed().as_secs_f64(), when: at(now) });
+            return Err(RunError::Stalled {
+                process: name.clone(),
+                how,
+                waited_s: asked.elapsed().as_secs_f64(),
+                when: at(now),
+            });
         }
     }
 }

@@ -1,10 +1,11 @@
 //! The whole `main` of a process that hosts boards.
 
 use crate::host::{Answer, Factory, Host};
+use crate::realtime::{self, Paced};
 use crate::remote::{Line, READY};
 use crate::{RunError, RunFolder};
 use board::BoardId;
-use channels::{Bells, Domain, Exchange};
+use channels::{Bells, Domain, Exchange, wall_ns};
 use messages::{BOARDS, Grant, flags};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::path::PathBuf;
@@ -59,13 +60,43 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
     line.reply(here[0], READY, &Answer::default())?;
     bells.ring(CHASSIS_BELL);
     let mut until = 0;
+    let mut paced: Option<Paced> = None;
     loop {
         while let Some(grant) = line.grant(&mut transfers)? {
+            if grant.flags & flags::START != 0 {
+                // refused rights are the chassis' to tell, once for all
+                realtime::ask_for_rights(&context.scenario.realtime);
+                host.exchange().measure();
+                paced = Some(Paced::new(grant.from, &context.scenario));
+                continue;
+            }
+            if let Some(paced) = &mut paced {
+                paced.push(grant, &transfers);
+                continue;
+            }
             let answer = host.step(&grant, &transfers)?;
             until = grant.until;
             let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
             line.reply(board, grant.window, &answer)?;
             bells.ring(CHASSIS_BELL);
+        }
+        if let Some(paced) = &mut paced
+            && let Some(due) = paced.due()
+        {
+            realtime::sleep_until(due, LIFELINE_PERIOD);
+            if wall_ns() < due {
+                continue;
+            }
+            if let Some((grant, answer)) = paced.step(&mut host)? {
+                until = grant.until;
+                if grant.flags & flags::FINISH != 0 {
+                    realtime::write_measured(&realtime::measured_file(&path, name), paced.measured(&mut host))?;
+                }
+                let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
+                line.reply(board, grant.window, &answer)?;
+                bells.ring(CHASSIS_BELL);
+            }
+            continue;
         }
         if !bell.wait(LIFELINE_PERIOD) && lifeline_cut() {
             if here.contains(&BoardId::BusAnalyzer) {

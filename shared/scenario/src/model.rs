@@ -115,8 +115,10 @@ pub struct Process {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Realtime {
-    /// Period of the interface boards and of the arm.
-    pub tick_us: u64,
+    /// Wall time from one stage of the signal path (D/A, arm, interfaces, control, workstation, recorder) to the next;
+    /// default: a tenth of the shortest task period.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stage_us: Option<u64>,
     /// SCHED_FIFO priority of the boards; 0 = time sharing.
     pub priority: u8,
     /// Lock all memory.
@@ -125,7 +127,7 @@ pub struct Realtime {
 
 impl Default for Realtime {
     fn default() -> Self {
-        Realtime { tick_us: 1000, priority: 50, lock_memory: true }
+        Realtime { stage_us: None, priority: 50, lock_memory: true }
     }
 }
 

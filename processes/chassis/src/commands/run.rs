@@ -76,7 +76,7 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
     let (mut failed, mut losses) = (false, false);
     for (variant, scenario) in &variants {
         let record = (!args.no_record).then(|| folder.join(format!("{}.mcap", variant.name)));
-        let setting = Setting { in_process: args.in_process, record: record.clone() };
+        let setting = Setting { in_process: args.in_process, record: record.clone(), ..Setting::default() };
         let finished = run_with_progress(scenario, variant, &setting)?;
         let mut result = finished.result;
         if let Some(error) = &finished.error {
@@ -209,7 +209,7 @@ fn sweeps(document: &Document, variants: &[(Variant, Scenario)]) -> miette::Resu
             }
         }
         let mut points = parallel(&jobs, |(value, variant, scenario)| {
-            let setting = Setting { in_process: true, record: None };
+            let setting = Setting { in_process: true, ..Setting::default() };
             rack_run::run(scenario, variant, &setting, &mut |_| {}).map(|finished| point(*value, &finished.result))
         });
         let points = points.drain(..).collect::<Result<Vec<_>, String>>().map_err(|reason| miette!("sweep {}: {reason}", sweep.key))?;

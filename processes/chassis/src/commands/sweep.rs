@@ -127,7 +127,7 @@ fn carry_out(document: &scenario::Document, plan: &Plan, store: &Store, open: &[
             return Ok(());
         }
         let (variant, scenario) = plan.resolve(document, point)?;
-        let setting = Setting { in_process: true, record: None };
+        let setting = Setting { in_process: true, ..Setting::default() };
         let row = match rack_run::run(&scenario, &variant, &setting, &mut |_| {}) {
             Err(reason) => Row::broken(point.index, plan, &reason),
             Ok(finished) => {

@@ -1,0 +1,361 @@
+//! Real time: the same windows as in lock step, but by the wall clock, peer to peer.
+//!
+//! The chassis runs the timing plane ahead and tells each board its windows before they are due; a board steps when its
+//! window has passed on the wall clock, with what has arrived by then. Nobody waits for anybody: what comes late is used
+//! when it comes, and counted. A window is told as soon as every decision that it depends on is known, and at the latest
+//! [`LEAD`] stages before it is due, then with what its tasks did last. A process that ends or stalls is a [`RunError`]
+//! within a bounded wall time.
+
+mod measured;
+mod paced;
+mod plan;
+mod rights;
+mod writes;
+
+pub use measured::Measured;
+pub(crate) use measured::write as write_measured;
+pub(crate) use paced::{Paced, sleep_until};
+pub(crate) use rights::ask as ask_for_rights;
+
+use crate::error::at;
+use crate::host::{Answer, Factory};
+use crate::lockstep::{Lockstep, STALL};
+use crate::{Context, Flow, Observer, RunError};
+use board::{BoardId, Mail, Ns};
+use channels::wall_ns;
+use messages::{BOARDS, Event, EventKind, Grant, Severity, TransferRecord, flags};
+use paced::{stage, stage_ns};
+use plan::{Draft, Plan};
+use std::collections::VecDeque;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+use vme::{Log, MILLISECOND, Op, Origin, Timing, Transfer};
+
+/// Stages before its end at which a window is told at the latest.
+const LEAD: u64 = 4;
+/// Windows are told at most this far ahead of the wall clock, and are at most this long.
+const HORIZON: Ns = 10 * MILLISECOND;
+/// Unanswered windows of a process after which no more are told until it catches up.
+const CREDIT: u32 = 64;
+/// Wall time between the last preparation and simulated time 0.
+const START_UP: u64 = 300 * MILLISECOND;
+/// Longest sleep: after it the chassis looks whether everybody still lives.
+const WATCH_PERIOD: Duration = Duration::from_millis(50);
+
+/// What a process has not answered yet.
+struct Debt {
+    grants: u32,
+    /// When it last answered.
+    since: Instant,
+    /// Processor time that it had used soon after.
+    used: Option<u64>,
+}
+
+/// A rack in real time.
+pub struct Realtime {
+    rack: Lockstep,
+    plan: Plan,
+    local: Paced,
+    zero: u64,
+    stage_ns: Ns,
+    /// Windows told that have not been shown to the observer.
+    told: VecDeque<(u64, Draft)>,
+    debts: Vec<Debt>,
+    reached: Ns,
+    watched: Instant,
+    own_mail: Mail,
+}
+
+impl Realtime {
+    /// Powers the rack up, as [`Lockstep::power_up`] does.
+    pub fn power_up(
+        context: Context,
+        factory: Factory<'_>,
+        programs: &dyn Fn(&scenario::Process) -> Vec<String>,
+        interrupted: &'static AtomicBool,
+    ) -> Result<Realtime, RunError> {
+        let scenario = context.scenario.clone();
+        let mut rack = Lockstep::power_up(context, factory, programs, interrupted)?;
+        for refused in ask_for_rights(&scenario.realtime) {
+            eprintln!("real time without {refused}; the run goes on");
+        }
+        if let Some(processor) = rack.processor_kept.take() {
+            // boards that run side by side want every processor
+            rack.pids().for_each(|(_, pid)| processor.release(pid));
+        }
+        let zero = wall_ns() + START_UP;
+        rack.host.exchange().measure();
+        let start = Grant { from: zero, flags: flags::START, ..rack.grant_of(BoardId::Chassis, 0, 0, 0) };
+        for remote in 0..rack.remotes.len() {
+            rack.remotes[remote].grant(&start, &[])?;
+            if let Some((bells, _)) = &rack.bells {
+                bells.ring(rack.remotes[remote].bell);
+            }
+        }
+        let plan = Plan::new(rack.timing.clone());
+        let debts = rack.remotes.iter().map(|_| Debt { grants: 0, since: Instant::now(), used: None }).collect();
+        Ok(Realtime {
+            plan,
+            local: Paced::new(zero, &scenario),
+            stage_ns: stage_ns(&scenario),
+            rack,
+            zero,
+            told: VecDeque::new(),
+            debts,
+            reached: 0,
+            watched: Instant::now(),
+            own_mail: Mail::default(),
+        })
+    }
+
+    /// Process numbers of the run.
+    pub fn pids(&self) -> impl Iterator<Item = (&str, u32)> {
+        self.rack.pids()
+    }
+
+    /// Simulated time reached.
+    pub fn now(&self) -> Ns {
+        self.reached
+    }
+
+    /// Bus and processors as far as all decisions are known.
+    pub fn timing(&self) -> &Timing {
+        self.plan.timing()
+    }
+
+    /// The longest job of each task that its board has asked for so far.
+    pub fn programs(&self) -> Vec<Vec<Op>> {
+        self.rack.programs()
+    }
+
+    /// Runs to `end`, or until the observer stops the run.
+    pub fn run(&mut self, end: Ns, observer: &mut dyn Observer) -> Result<(), RunError> {
+        let mut draft: Option<Draft> = None;
+        while self.reached < end {
+            if self.take_answers()? {
+                draft = None;
+            }
+            while self.local.due().is_some_and(|due| due <= wall_ns()) {
+                self.step_here()?;
+            }
+            if self.close_windows(observer)? == Flow::Stop {
+                break;
+            }
+            self.watch()?;
+            let clock = wall_ns().saturating_sub(self.zero);
+            let mut next = self.local.due().unwrap_or(u64::MAX);
+            next = next.min(self.told.front().map_or(u64::MAX, |(_, draft)| self.closing(draft.until)));
+            if self.plan.told_to() < end && self.debts.iter().all(|debt| debt.grants < CREDIT) {
+                let from = self.plan.told_to();
+                if from > clock + HORIZON {
+                    next = next.min(self.zero + from - HORIZON);
+                } else {
+                    let limit = end.min(from + HORIZON);
+                    let window = draft.take().unwrap_or_else(|| self.plan.draft(limit));
+                    let latest = window.until.saturating_sub(LEAD * self.stage_ns);
+                    if self.plan.is_settled() || latest <= clock {
+                        self.tell(window)?;
+                        continue;
+                    }
+                    next = next.min(self.zero + latest);
+                    draft = Some(window);
+                }
+            }
+            self.rest_until(next);
+        }
+        Ok(())
+    }
+
+    /// Ends the run: the recorder closes its file, the processes leave. What was measured on the wall clock.
+    pub fn finish(mut self) -> Result<Vec<Measured>, RunError> {
+        let now = self.reached;
+        for board in &BOARDS[1..] {
+            let grant = Grant { window: self.rack.window, ..self.rack.grant_of(*board, now, now, flags::FINISH) };
+            self.grant(&grant)?;
+        }
+        while self.local.due().is_some() || self.debts.iter().any(|debt| debt.grants > 0) {
+            self.take_answers()?;
+            self.step_here()?;
+            self.watch()?;
+            self.rest_until(wall_ns() + MILLISECOND);
+        }
+        let mut measured = self.local.measured(&mut self.rack.host);
+        for remote in &self.rack.remotes {
+            let Some(folder) = self.rack.folder() else { break };
+            measured.extend(measured::read(&measured_file(folder, &remote.process))?);
+        }
+        self.rack.power.shut_down();
+        Ok(measured)
+    }
+
+    /// When a window's results are there, on the wall clock.
+    fn closing(&self, until: Ns) -> u64 {
+        self.zero + until + stage(BoardId::Chassis) * self.stage_ns
+    }
+
+    fn rest_until(&mut self, due: u64) {
+        let limit = Duration::from_nanos(due.saturating_sub(wall_ns())).min(WATCH_PERIOD);
+        match &mut self.rack.bells {
+            // an answer ends the rest early
+            Some((_, bell)) if !self.rack.remotes.is_empty() => {
+                bell.wait(limit);
+            }
+            _ => sleep_until(due, limit),
+        }
+    }
+
+    /// Tells every board its part of a window; the recorder's comes when the window has passed.
+    fn tell(&mut self, draft: Draft) -> Result<(), RunError> {
+        self.plan.tell(self.rack.window, &draft);
+        let Draft { from, until, decision, .. } = draft;
+        self.rack.to_board.iter_mut().for_each(Vec::clear);
+        for transfer in programs(&draft.log) {
+            if let Some(slave) = transfer.slave {
+                let board = self.rack.board_of_slave[usize::from(slave)];
+                self.rack.to_board[board as usize].push(transfer.into());
+            }
+        }
+        for board in [BoardId::DaIo, BoardId::HwSim, BoardId::ForceSensorIf, BoardId::EncoderIf] {
+            let grant = self.rack.grant_of(board, from, until, 0);
+            self.grant(&grant)?;
+        }
+        for board in [BoardId::ControlComputer, BoardId::Workstation] {
+            let mut grant = self.rack.grant_of(board, from, until, 0);
+            if let Some((task, job)) = decision
+                && self.rack.board_of_task[usize::from(task)] == board
+            {
+                grant.flags = flags::DECIDE;
+                (grant.task, grant.job) = (task.into(), job);
+            } else if self.rack.to_board[board as usize].is_empty() {
+                continue;
+            }
+            self.grant(&grant)?;
+        }
+        self.told.push_back((self.rack.window, draft));
+        self.rack.window += 1;
+        Ok(())
+    }
+
+    fn grant(&mut self, grant: &Grant) -> Result<(), RunError> {
+        let board = grant.board as usize;
+        match self.rack.place[board] {
+            None => self.local.push(*grant, &self.rack.to_board[board]),
+            Some(remote) => {
+                self.rack.send_grant(remote, grant).map_err(|error| self.dated(error))?;
+                let debt = &mut self.debts[remote];
+                if debt.grants == 0 {
+                    (debt.since, debt.used) = (Instant::now(), None);
+                }
+                debt.grants += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// True where a decision has become known.
+    fn take_answers(&mut self) -> Result<bool, RunError> {
+        let mut any = false;
+        for remote in 0..self.rack.remotes.len() {
+            while let Some((board, window, answer)) = self.rack.remotes[remote].reply(self.reached)? {
+                let grants = self.debts[remote].grants.saturating_sub(1);
+                self.debts[remote] = Debt { grants, since: Instant::now(), used: None };
+                any |= self.answered(board, window, answer)?;
+            }
+        }
+        Ok(any)
+    }
+
+    fn answered(&mut self, board: BoardId, window: u64, answer: Answer) -> Result<bool, RunError> {
+        let task = self.plan.task_of(window).filter(|task| self.rack.board_of_task[usize::from(*task)] == board);
+        if let Some(task) = task {
+            if let Some(rest) = &answer.rest {
+                self.rack.note_rest(task, rest);
+            }
+            self.plan.decided(window, task, answer.rest);
+        }
+        if let Some((task, program)) = answer.program {
+            self.rack.set_program(board, task, &program)?;
+            self.plan.set_program(task, &program);
+        }
+        Ok(task.is_some())
+    }
+
+    fn step_here(&mut self) -> Result<(), RunError> {
+        if let Some((grant, answer)) = self.local.step(&mut self.rack.host)? {
+            self.answered(BOARDS[grant.board as usize], grant.window, answer)?;
+        }
+        Ok(())
+    }
+
+    /// Shows the observer the windows whose results are there, and lets the recorder have them.
+    fn close_windows(&mut self, observer: &mut dyn Observer) -> Result<Flow, RunError> {
+        while let Some((_, next)) = self.told.front()
+            && self.closing(next.until) <= wall_ns()
+        {
+            let Some((window, Draft { from, until, log, trips, .. })) = self.told.pop_front() else { break };
+            self.own_mail.clear();
+            self.own_mail.transfers.extend(programs(&log).map(TransferRecord::from));
+            self.own_mail.events.extend(trips.iter().map(|(at, task, job)| {
+                let (job, task) = ((*job).into(), (*task).into());
+                Event::new(*at, EventKind::OverrunTrip, Severity::Error, job, task)
+            }));
+            self.rack.host.send(&self.own_mail)?;
+            self.rack.to_board[BoardId::BusAnalyzer as usize].clear();
+            let grant = Grant { window, ..self.rack.grant_of(BoardId::BusAnalyzer, from, until, 0) };
+            self.grant(&grant)?;
+            let mail = self.rack.host.fetch(BoardId::Chassis, self.reached)?;
+            self.reached = until;
+            let flow = observer.window(until, mail, &log);
+            mail.clear();
+            if flow == Flow::Stop {
+                return Ok(Flow::Stop);
+            }
+        }
+        Ok(Flow::Continue)
+    }
+
+    /// The same error with the time that this run has reached.
+    fn dated(&self, error: RunError) -> RunError {
+        let when = at(self.reached);
+        match error {
+            RunError::Died { process, how, .. } => RunError::Died { process, how, when },
+            RunError::Interrupted { .. } => RunError::Interrupted { when },
+            other => other,
+        }
+    }
+
+    fn watch(&mut self) -> Result<(), RunError> {
+        if self.watched.elapsed() < WATCH_PERIOD {
+            return Ok(());
+        }
+        self.watched = Instant::now();
+        self.rack.watch().map_err(|error| self.dated(error))?;
+        let Lockstep { power, remotes, .. } = &self.rack;
+        for (debt, remote) in self.debts.iter_mut().zip(remotes).filter(|(debt, _)| debt.grants > 0) {
+            let used = *debt.used.get_or_insert_with(|| power.used(&remote.process));
+            if debt.since.elapsed() > STALL {
+                if let Some(how) = power.idle(&remote.process, used) {
+                    return Err(RunError::Stalled {
+                        process: remote.process.clone(),
+                        how: how.into(),
+                        waited_s: debt.since.elapsed().as_secs_f64(),
+                        when: at(self.reached),
+                    });
+                }
+                // starved, not stalled
+                (debt.since, debt.used) = (Instant::now(), None);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The transfers that the data plane carries out.
+fn programs(log: &Log) -> impl Iterator<Item = &Transfer> {
+    log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program)
+}
+
+/// File of a process' measurements in the run folder.
+pub(crate) fn measured_file(folder: &std::path::Path, process: &str) -> std::path::PathBuf {
+    folder.join(format!("measured-{process}.toml"))
+}

@@ -1,0 +1,70 @@
+//! The windows of a real-time run: boards that only listen, all in the chassis.
+
+use board::{Board, BoardId, Inputs, Mail, Ns, Op, Outputs};
+use pacing::{Context, Flow, Observer, Realtime};
+use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{Sender, channel};
+use vme::{Log, MILLISECOND};
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Tells the windows and decisions that it is given.
+struct Listener {
+    role: BoardId,
+    heard: Sender<(BoardId, Ns, Ns, Option<u32>)>,
+}
+
+impl Board for Listener {
+    fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
+        if inputs.boot && self.role == BoardId::ControlComputer {
+            out.program = Some((0, vec![Op::Exec(10_000), Op::Decide]));
+        }
+        if !inputs.boot && !inputs.finish {
+            let job = inputs.decision.map(|decision| decision.job);
+            self.heard.send((self.role, inputs.from, inputs.until, job)).expect("the test listens");
+        }
+    }
+}
+
+#[derive(Default)]
+struct Windows(Vec<Ns>);
+
+impl Observer for Windows {
+    fn window(&mut self, until: Ns, _mail: &Mail, _log: &Log) -> Flow {
+        self.0.push(until);
+        Flow::Continue
+    }
+}
+
+#[test]
+fn every_board_gets_every_window_once_and_in_order_and_every_job_is_decided_once() {
+    let scenario = scenario::load("table-5-3", &[]).and_then(|document| document.scenario()).expect("scenario");
+    let boards = messages::BOARDS[1..].iter().map(|board| board.name().to_owned()).collect();
+    let chassis = scenario::Process { name: "chassis".into(), boards, command: Vec::new() };
+    let scenario = scenario::Scenario { processes: vec![chassis], ..scenario };
+    let context = Context { prefix: String::new(), variant: String::new(), record: None, scenario };
+    let (heard, hear) = channel();
+    let factory = |role, _: &Context| Ok(Box::new(Listener { role, heard: heard.clone() }) as Box<dyn Board>);
+    let mut rack = Realtime::power_up(context, &factory, &|_| Vec::new(), &INTERRUPTED).expect("power up");
+    let end = 200 * MILLISECOND;
+    let mut windows = Windows::default();
+    rack.run(end, &mut windows).expect("run");
+    let measured = rack.finish().expect("finish");
+
+    assert_eq!(windows.0.last(), Some(&end));
+    assert!(windows.0.is_sorted());
+    let heard: Vec<_> = hear.try_iter().collect();
+    for board in [BoardId::DaIo, BoardId::HwSim, BoardId::ForceSensorIf, BoardId::EncoderIf, BoardId::BusAnalyzer] {
+        let mut reached = 0;
+        for (_, from, until, _) in heard.iter().filter(|(role, ..)| *role == board) {
+            assert_eq!(*from, reached, "{board:?}");
+            reached = *until;
+        }
+        assert_eq!(reached, end, "{board:?}");
+    }
+    let jobs: Vec<u32> =
+        heard.iter().filter(|(role, ..)| *role == BoardId::ControlComputer).filter_map(|(.., job)| *job).collect();
+    assert_eq!(jobs, (0..40).collect::<Vec<u32>>());
+    let wake_up = measured.iter().find(|path| path.path == "wake-up hw_sim").expect("measured");
+    assert!(wake_up.n >= 40 && wake_up.max_ns > 0, "{wake_up:?}");
+}

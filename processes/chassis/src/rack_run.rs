@@ -2,6 +2,7 @@
 
 use crate::boards;
 use board::{Mail, Ns};
+use clap::ValueEnum;
 use messages::{EventKind, drive_status};
 use pacing::{Context, Flow, Lockstep, Measured, Observer, Realtime, RunError};
 use report::{Accounting, BusAccount, Ended, Ledger, Trace, VariantResult};
@@ -16,7 +17,7 @@ use vme::{Log, Origin, Program};
 pub static INTERRUPTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// How time goes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Pacing {
     /// Simulated time, as fast as the machine allows.
     #[default]

@@ -12,6 +12,7 @@
 #![warn(missing_docs)]
 
 mod affinity;
+mod boards;
 mod error;
 mod holdback;
 mod host;

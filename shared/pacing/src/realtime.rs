@@ -17,9 +17,9 @@ pub(crate) use measured::write as write_measured;
 pub(crate) use paced::{Paced, sleep_until};
 pub(crate) use rights::ask as ask_for_rights;
 
+use crate::boards::{Boards, STALL, WATCH_PERIOD, program_transfers};
 use crate::error::at;
 use crate::host::{Answer, Factory};
-use crate::lockstep::{Lockstep, STALL};
 use crate::{Context, Flow, Observer, RunError};
 use board::{BoardId, Mail, Ns};
 use channels::wall_ns;
@@ -29,7 +29,7 @@ use plan::{Draft, Plan};
 use std::collections::VecDeque;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
-use vme::{Log, MILLISECOND, Op, Origin, Timing, Transfer};
+use vme::{MILLISECOND, Op, Timing};
 
 /// Stages before its end at which a window is told at the latest.
 const LEAD: u64 = 4;
@@ -39,8 +39,6 @@ const HORIZON: Ns = 10 * MILLISECOND;
 const CREDIT: u32 = 64;
 /// Wall time between the last preparation and simulated time 0.
 const START_UP: u64 = 300 * MILLISECOND;
-/// Longest sleep: after it the chassis looks whether everybody still lives.
-const WATCH_PERIOD: Duration = Duration::from_millis(50);
 
 /// What a process has not answered yet.
 struct Debt {
@@ -53,7 +51,7 @@ struct Debt {
 
 /// A rack in real time.
 pub struct Realtime {
-    rack: Lockstep,
+    boards: Boards,
     plan: Plan,
     local: Paced,
     zero: u64,
@@ -61,13 +59,12 @@ pub struct Realtime {
     /// Windows told that have not been shown to the observer.
     told: VecDeque<(u64, Draft)>,
     debts: Vec<Debt>,
-    reached: Ns,
     watched: Instant,
     own_mail: Mail,
 }
 
 impl Realtime {
-    /// Powers the rack up, as [`Lockstep::power_up`] does.
+    /// Powers the rack up, as [`crate::Lockstep::power_up`] does.
     pub fn power_up(
         context: Context,
         factory: Factory<'_>,
@@ -75,34 +72,33 @@ impl Realtime {
         interrupted: &'static AtomicBool,
     ) -> Result<Realtime, RunError> {
         let scenario = context.scenario.clone();
-        let mut rack = Lockstep::power_up(context, factory, programs, interrupted)?;
+        let (mut boards, timing) = Boards::power_up(context, factory, programs, interrupted)?;
         for refused in ask_for_rights(&scenario.realtime) {
             eprintln!("real time without {refused}; the run goes on");
         }
-        if let Some(processor) = rack.processor_kept.take() {
+        if let Some(processor) = boards.processor_kept.take() {
             // boards that run side by side want every processor
-            rack.pids().for_each(|(_, pid)| processor.release(pid));
+            boards.power.pids().for_each(|(_, pid)| processor.release(pid));
         }
         let zero = wall_ns() + START_UP;
-        rack.host.exchange().measure();
-        let start = Grant { from: zero, flags: flags::START, ..rack.grant_of(BoardId::Chassis, 0, 0, 0) };
-        for remote in 0..rack.remotes.len() {
-            rack.remotes[remote].grant(&start, &[])?;
-            if let Some((bells, _)) = &rack.bells {
-                bells.ring(rack.remotes[remote].bell);
+        boards.host.exchange().measure();
+        let start = Grant { from: zero, flags: flags::START, ..boards.grant_of(BoardId::Chassis, 0, 0, 0) };
+        for remote in 0..boards.remotes.len() {
+            boards.remotes[remote].grant(&start, &[])?;
+            if let Some((bells, _)) = &boards.bells {
+                bells.ring(boards.remotes[remote].bell);
             }
         }
-        let plan = Plan::new(rack.timing.clone());
-        let debts = rack.remotes.iter().map(|_| Debt { grants: 0, since: Instant::now(), used: None }).collect();
+        let plan = Plan::new(timing);
+        let debts = boards.remotes.iter().map(|_| Debt { grants: 0, since: Instant::now(), used: None }).collect();
         Ok(Realtime {
             plan,
             local: Paced::new(zero, &scenario),
             stage_ns: stage_ns(&scenario),
-            rack,
+            boards,
             zero,
             told: VecDeque::new(),
             debts,
-            reached: 0,
             watched: Instant::now(),
             own_mail: Mail::default(),
         })
@@ -110,12 +106,12 @@ impl Realtime {
 
     /// Process numbers of the run.
     pub fn pids(&self) -> impl Iterator<Item = (&str, u32)> {
-        self.rack.pids()
+        self.boards.power.pids()
     }
 
     /// Simulated time reached.
     pub fn now(&self) -> Ns {
-        self.reached
+        self.boards.reached
     }
 
     /// Bus and processors as far as all decisions are known.
@@ -125,13 +121,13 @@ impl Realtime {
 
     /// The longest job of each task that its board has asked for so far.
     pub fn programs(&self) -> Vec<Vec<Op>> {
-        self.rack.programs()
+        self.boards.programs()
     }
 
     /// Runs to `end`, or until the observer stops the run.
     pub fn run(&mut self, end: Ns, observer: &mut dyn Observer) -> Result<(), RunError> {
         let mut draft: Option<Draft> = None;
-        while self.reached < end {
+        while self.boards.reached < end {
             if self.take_answers()? {
                 draft = None;
             }
@@ -168,9 +164,9 @@ impl Realtime {
 
     /// Ends the run: the recorder closes its file, the processes leave. What was measured on the wall clock.
     pub fn finish(mut self) -> Result<Vec<Measured>, RunError> {
-        let now = self.reached;
+        let now = self.boards.reached;
         for board in &BOARDS[1..] {
-            let grant = Grant { window: self.rack.window, ..self.rack.grant_of(*board, now, now, flags::FINISH) };
+            let grant = Grant { window: self.boards.window, ..self.boards.grant_of(*board, now, now, flags::FINISH) };
             self.grant(&grant)?;
         }
         while self.local.due().is_some() || self.debts.iter().any(|debt| debt.grants > 0) {
@@ -179,12 +175,12 @@ impl Realtime {
             self.watch()?;
             self.rest_until(wall_ns() + MILLISECOND);
         }
-        let mut measured = self.local.measured(&mut self.rack.host);
-        for remote in &self.rack.remotes {
-            let Some(folder) = self.rack.folder() else { break };
-            measured.extend(measured::read(&measured_file(folder, &remote.process))?);
+        let mut measured = self.local.measured(&mut self.boards.host);
+        for remote in &self.boards.remotes {
+            let Some(folder) = &self.boards.folder else { break };
+            measured.extend(measured::read(&measured_file(&folder.path, &remote.process))?);
         }
-        self.rack.power.shut_down();
+        self.boards.power.shut_down();
         Ok(measured)
     }
 
@@ -195,9 +191,9 @@ impl Realtime {
 
     fn rest_until(&mut self, due: u64) {
         let limit = Duration::from_nanos(due.saturating_sub(wall_ns())).min(WATCH_PERIOD);
-        match &mut self.rack.bells {
+        match &mut self.boards.bells {
             // an answer ends the rest early
-            Some((_, bell)) if !self.rack.remotes.is_empty() => {
+            Some((_, bell)) if !self.boards.remotes.is_empty() => {
                 bell.wait(limit);
             }
             _ => sleep_until(due, limit),
@@ -206,42 +202,36 @@ impl Realtime {
 
     /// Tells every board its part of a window; the recorder's comes when the window has passed.
     fn tell(&mut self, draft: Draft) -> Result<(), RunError> {
-        self.plan.tell(self.rack.window, &draft);
+        self.plan.tell(self.boards.window, &draft);
+        self.boards.sort_transfers(&draft.log);
         let Draft { from, until, decision, .. } = draft;
-        self.rack.to_board.iter_mut().for_each(Vec::clear);
-        for transfer in programs(&draft.log) {
-            if let Some(slave) = transfer.slave {
-                let board = self.rack.board_of_slave[usize::from(slave)];
-                self.rack.to_board[board as usize].push(transfer.into());
-            }
-        }
         for board in [BoardId::DaIo, BoardId::HwSim, BoardId::ForceSensorIf, BoardId::EncoderIf] {
-            let grant = self.rack.grant_of(board, from, until, 0);
+            let grant = self.boards.grant_of(board, from, until, 0);
             self.grant(&grant)?;
         }
         for board in [BoardId::ControlComputer, BoardId::Workstation] {
-            let mut grant = self.rack.grant_of(board, from, until, 0);
+            let mut grant = self.boards.grant_of(board, from, until, 0);
             if let Some((task, job)) = decision
-                && self.rack.board_of_task[usize::from(task)] == board
+                && self.boards.of_task[usize::from(task)] == board
             {
                 grant.flags = flags::DECIDE;
                 (grant.task, grant.job) = (task.into(), job);
-            } else if self.rack.to_board[board as usize].is_empty() {
+            } else if self.boards.transfers[board as usize].is_empty() {
                 continue;
             }
             self.grant(&grant)?;
         }
-        self.told.push_back((self.rack.window, draft));
-        self.rack.window += 1;
+        self.told.push_back((self.boards.window, draft));
+        self.boards.window += 1;
         Ok(())
     }
 
     fn grant(&mut self, grant: &Grant) -> Result<(), RunError> {
         let board = grant.board as usize;
-        match self.rack.place[board] {
-            None => self.local.push(*grant, &self.rack.to_board[board]),
+        match self.boards.place[board] {
+            None => self.local.push(*grant, &self.boards.transfers[board]),
             Some(remote) => {
-                self.rack.send_grant(remote, grant).map_err(|error| self.dated(error))?;
+                self.boards.send_grant(remote, grant)?;
                 let debt = &mut self.debts[remote];
                 if debt.grants == 0 {
                     (debt.since, debt.used) = (Instant::now(), None);
@@ -255,8 +245,8 @@ impl Realtime {
     /// True where a decision has become known.
     fn take_answers(&mut self) -> Result<bool, RunError> {
         let mut any = false;
-        for remote in 0..self.rack.remotes.len() {
-            while let Some((board, window, answer)) = self.rack.remotes[remote].reply(self.reached)? {
+        for remote in 0..self.boards.remotes.len() {
+            while let Some((board, window, answer)) = self.boards.remotes[remote].reply(self.boards.reached)? {
                 let grants = self.debts[remote].grants.saturating_sub(1);
                 self.debts[remote] = Debt { grants, since: Instant::now(), used: None };
                 any |= self.answered(board, window, answer)?;
@@ -266,22 +256,22 @@ impl Realtime {
     }
 
     fn answered(&mut self, board: BoardId, window: u64, answer: Answer) -> Result<bool, RunError> {
-        let task = self.plan.task_of(window).filter(|task| self.rack.board_of_task[usize::from(*task)] == board);
+        let task = self.plan.task_of(window).filter(|task| self.boards.of_task[usize::from(*task)] == board);
         if let Some(task) = task {
             if let Some(rest) = &answer.rest {
-                self.rack.note_rest(task, rest);
+                self.boards.note_rest(task, rest);
             }
             self.plan.decided(window, task, answer.rest);
         }
         if let Some((task, program)) = answer.program {
-            self.rack.set_program(board, task, &program)?;
+            self.boards.note_program(board, task, &program)?;
             self.plan.set_program(task, &program);
         }
         Ok(task.is_some())
     }
 
     fn step_here(&mut self) -> Result<(), RunError> {
-        if let Some((grant, answer)) = self.local.step(&mut self.rack.host)? {
+        if let Some((grant, answer)) = self.local.step(&mut self.boards.host)? {
             self.answered(BOARDS[grant.board as usize], grant.window, answer)?;
         }
         Ok(())
@@ -294,17 +284,17 @@ impl Realtime {
         {
             let Some((window, Draft { from, until, log, trips, .. })) = self.told.pop_front() else { break };
             self.own_mail.clear();
-            self.own_mail.transfers.extend(programs(&log).map(TransferRecord::from));
+            self.own_mail.transfers.extend(program_transfers(&log).map(TransferRecord::from));
             self.own_mail.events.extend(trips.iter().map(|(at, task, job)| {
                 let (job, task) = ((*job).into(), (*task).into());
                 Event::new(*at, EventKind::OverrunTrip, Severity::Error, job, task)
             }));
-            self.rack.host.send(&self.own_mail)?;
-            self.rack.to_board[BoardId::BusAnalyzer as usize].clear();
-            let grant = Grant { window, ..self.rack.grant_of(BoardId::BusAnalyzer, from, until, 0) };
+            self.boards.host.send(&self.own_mail)?;
+            self.boards.transfers[BoardId::BusAnalyzer as usize].clear();
+            let grant = Grant { window, ..self.boards.grant_of(BoardId::BusAnalyzer, from, until, 0) };
             self.grant(&grant)?;
-            let mail = self.rack.host.fetch(BoardId::Chassis, self.reached)?;
-            self.reached = until;
+            let mail = self.boards.host.fetch(BoardId::Chassis, self.boards.reached)?;
+            self.boards.reached = until;
             let flow = observer.window(until, mail, &log);
             mail.clear();
             if flow == Flow::Stop {
@@ -314,23 +304,13 @@ impl Realtime {
         Ok(Flow::Continue)
     }
 
-    /// The same error with the time that this run has reached.
-    fn dated(&self, error: RunError) -> RunError {
-        let when = at(self.reached);
-        match error {
-            RunError::Died { process, how, .. } => RunError::Died { process, how, when },
-            RunError::Interrupted { .. } => RunError::Interrupted { when },
-            other => other,
-        }
-    }
-
     fn watch(&mut self) -> Result<(), RunError> {
         if self.watched.elapsed() < WATCH_PERIOD {
             return Ok(());
         }
         self.watched = Instant::now();
-        self.rack.watch().map_err(|error| self.dated(error))?;
-        let Lockstep { power, remotes, .. } = &self.rack;
+        self.boards.watch()?;
+        let Boards { power, remotes, reached, .. } = &self.boards;
         for (debt, remote) in self.debts.iter_mut().zip(remotes).filter(|(debt, _)| debt.grants > 0) {
             let used = *debt.used.get_or_insert_with(|| power.used(&remote.process));
             if debt.since.elapsed() > STALL {
@@ -339,7 +319,7 @@ impl Realtime {
                         process: remote.process.clone(),
                         how: how.into(),
                         waited_s: debt.since.elapsed().as_secs_f64(),
-                        when: at(self.reached),
+                        when: at(*reached),
                     });
                 }
                 // starved, not stalled
@@ -348,11 +328,6 @@ impl Realtime {
         }
         Ok(())
     }
-}
-
-/// The transfers that the data plane carries out.
-fn programs(log: &Log) -> impl Iterator<Item = &Transfer> {
-    log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program)
 }
 
 /// File of a process' measurements in the run folder.

@@ -4,8 +4,8 @@
 //! limit is violated.
 
 use crate::parallel::parallel;
-use crate::rack_run::{self, Finished, INTERRUPTED, Setting};
-use clap::{Args, ValueEnum};
+use crate::rack_run::{self, Finished, INTERRUPTED, Pacing, Setting};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use report::{RunReport, Sweep, SweepPoint, VariantResult, Verdict};
@@ -48,17 +48,8 @@ pub struct RunArgs {
     json: bool,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Pacing {
-    Lockstep,
-    Realtime,
-}
-
 /// Runs the command and returns its exit code.
 pub fn run(args: RunArgs) -> miette::Result<u8> {
-    if args.pacing == Pacing::Realtime {
-        return Err(miette!("--pacing realtime is not built yet; lock step across processes and --in-process are"));
-    }
     let mut overrides = args.set.clone();
     overrides.extend(args.seed.map(|seed| format!("seed={seed}")));
     overrides.extend(args.duration.map(|seconds| format!("duration_s={seconds:?}")));
@@ -76,7 +67,7 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
     let (mut failed, mut losses) = (false, false);
     for (variant, scenario) in &variants {
         let record = (!args.no_record).then(|| folder.join(format!("{}.mcap", variant.name)));
-        let setting = Setting { in_process: args.in_process, record: record.clone(), ..Setting::default() };
+        let setting = Setting { pacing: args.pacing, in_process: args.in_process, record: record.clone() };
         let finished = run_with_progress(scenario, variant, &setting)?;
         let mut result = finished.result;
         if let Some(error) = &finished.error {
@@ -101,7 +92,11 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
     }
     let sweeps = if failed { Vec::new() } else { sweeps(&document, &variants)? };
 
-    let pacing = if args.in_process { "lock step in one process" } else { "lock step across processes" };
+    let pacing = match (args.pacing, args.in_process) {
+        (Pacing::Lockstep, true) => "lock step in one process",
+        (Pacing::Lockstep, false) => "lock step across processes",
+        (Pacing::Realtime, _) => "real time across processes",
+    };
     let base = document.scenario()?;
     let report = RunReport::new(&document.name, &base, pacing, results, sweeps);
     report.write(&folder).map_err(|error| miette!("{error}"))?;

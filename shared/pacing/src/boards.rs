@@ -1,0 +1,314 @@
+//! The boards of a run, wherever they live, in the chassis or in a process of their own: power-up, grants and answers.
+//!
+//! Whoever is asked answers, or the run ends with a [`RunError`] that names the process, within a bounded wall time.
+
+use crate::affinity::OneProcessor;
+use crate::error::at;
+use crate::host::{Answer, Factory, Host};
+use crate::remote::{READY, Remote};
+use crate::serve::{CHASSIS_BELL, process_of};
+use crate::{Context, Power, RunError, RunFolder};
+use board::{BoardId, Ns, Op};
+use channels::{Bell, Bells, Domain, Exchange};
+use messages::{BOARDS, Grant, TransferRecord, flags};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use vme::{Log, Origin, Timing, Transfer};
+
+/// How often a wait looks whether everybody still lives.
+pub(crate) const WATCH_PERIOD: Duration = Duration::from_millis(50);
+/// No answer for this long and no sign of life: stalled.
+pub(crate) const STALL: Duration = Duration::from_secs(5);
+/// Processor time that no single answer takes.
+const SPIN_S: u64 = 5;
+/// Processes get this long to report ready.
+const READY_LIMIT: Duration = Duration::from_secs(30);
+
+/// All boards but the chassis' own.
+pub(crate) struct Boards {
+    pub host: Host,
+    pub remotes: Vec<Remote>,
+    /// Index in `remotes` of each board's process; `None` = here.
+    pub place: [Option<usize>; BOARDS.len()],
+    pub power: Power,
+    pub bells: Option<(Bells, Bell)>,
+    /// Boards of the rack's tasks and slaves.
+    pub of_task: Vec<BoardId>,
+    of_slave: Vec<BoardId>,
+    /// Transfers made to each board in the window.
+    pub transfers: [Vec<TransferRecord>; BOARDS.len()],
+    /// Number of the window.
+    pub window: u64,
+    /// Simulated time reached.
+    pub reached: Ns,
+    /// Grants that the recorder has not answered yet.
+    pub recorder_owes: u32,
+    /// Program and longest rest of each task that its board has asked for so far.
+    longest: Vec<[Vec<Op>; 2]>,
+    interrupted: &'static AtomicBool,
+    /// Lock step's processor.
+    pub processor_kept: Option<OneProcessor>,
+    // last: it removes the folder once nobody uses it
+    pub folder: Option<RunFolder>,
+}
+
+impl Boards {
+    /// Starts the processes of the scenario (none if all its boards are in the chassis), waits until each is ready, and
+    /// lets every board show its initial state. `programs` finds the built-in program of a process.
+    pub fn power_up(
+        mut context: Context,
+        factory: Factory<'_>,
+        programs: &dyn Fn(&scenario::Process) -> Vec<String>,
+        interrupted: &'static AtomicBool,
+    ) -> Result<(Boards, Timing), RunError> {
+        let scenario = context.scenario.clone();
+        let mut timing = Timing::new(scenario.rack.clone())?;
+        let place = BOARDS.map(|board| process_of(&scenario, board));
+        let away: Vec<usize> = (0..scenario.processes.len()).filter(|i| place.contains(&(i + 1))).collect();
+        let here: Vec<BoardId> = BOARDS.into_iter().filter(|board| place[*board as usize] == 0).collect();
+        let mut power = Power::default();
+        let mut remotes = Vec::new();
+        let (mut folder, mut domain, mut bells) = (None, None, None);
+        if !away.is_empty() {
+            let run_folder = RunFolder::create()?;
+            context.prefix = run_folder.prefix.clone();
+            run_folder.write_context(&context)?;
+            let joined = Domain::join(&run_folder.path, &run_folder.prefix, "chassis")?;
+            let page = Bells::open(&run_folder.path.join("bells"), scenario.processes.len() + 1)?;
+            for i in &away {
+                remotes.push(Remote::open(&joined, &scenario.processes[*i].name, i + 1)?);
+            }
+            bells = Some((page.clone(), page.bell(CHASSIS_BELL)));
+            domain = Some(joined);
+            folder = Some(run_folder);
+        }
+        let exchange = Exchange::open(&here, domain.as_ref(), |board| place[board as usize])?;
+        let host = Host::new(&here, exchange, &context, factory)?;
+        let processor = folder.as_ref().and_then(|_| OneProcessor::stay());
+        if let Some(folder) = &folder {
+            for i in &away {
+                let process = &scenario.processes[*i];
+                let pid = power.spawn(&process.name, &programs(process), &folder.path)?;
+                let records = process.boards.iter().any(|board| board == BoardId::BusAnalyzer.name());
+                if let Some(processor) = processor.as_ref().filter(|_| records) {
+                    processor.release(pid);
+                }
+            }
+        }
+        let board_named = |name: &str| BoardId::from_name(name).unwrap_or(BoardId::Chassis);
+        let mut boards = Boards {
+            host,
+            remotes,
+            place: place.map(|process| away.iter().position(|i| i + 1 == process)),
+            power,
+            bells,
+            of_task: scenario.rack.tasks.iter().map(|task| board_named(&task.board)).collect(),
+            of_slave: scenario.rack.slaves.iter().map(|slave| board_named(&slave.board)).collect(),
+            transfers: Default::default(),
+            window: 0,
+            reached: 0,
+            recorder_owes: 0,
+            longest: vec![[const { Vec::new() }; 2]; scenario.rack.tasks.len()],
+            interrupted,
+            processor_kept: processor,
+            folder,
+        };
+        boards.wait_until_ready()?;
+        for board in &BOARDS[1..] {
+            let answer = boards.ask(&boards.grant_of(*board, 0, 0, flags::BOOT))?;
+            if let Some((task, program)) = answer.program {
+                boards.note_program(*board, task, &program)?;
+                timing.set_program(task, &program);
+            }
+        }
+        Ok((boards, timing))
+    }
+
+    /// The longest job of each task that its board has asked for so far.
+    pub fn programs(&self) -> Vec<Vec<Op>> {
+        self.longest.iter().map(|job| job.concat()).collect()
+    }
+
+    fn wait_until_ready(&mut self) -> Result<(), RunError> {
+        let start = Instant::now();
+        for i in 0..self.remotes.len() {
+            loop {
+                match self.remotes[i].reply(0)? {
+                    Some((_, READY, _)) => break,
+                    Some(_) => {
+                        return Err(RunError::BadAnswer {
+                            board: "unknown",
+                            what: format!("process `{}` answered before it was asked", self.remotes[i].process),
+                            when: at(0),
+                        });
+                    }
+                    None => {}
+                }
+                self.listen()?;
+                if start.elapsed() > READY_LIMIT {
+                    return Err(RunError::Stalled {
+                        process: self.remotes[i].process.clone(),
+                        how: "it did not report ready".into(),
+                        waited_s: start.elapsed().as_secs_f64(),
+                        when: at(0),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits a little for the chassis' bell.
+    fn listen(&mut self) -> Result<(), RunError> {
+        let Some((_, bell)) = &mut self.bells else { return Ok(()) };
+        if !bell.wait(WATCH_PERIOD) {
+            self.watch()?;
+        }
+        Ok(())
+    }
+
+    /// An error where a process has ended or the user wants to stop.
+    pub fn watch(&mut self) -> Result<(), RunError> {
+        if self.interrupted.load(Ordering::Relaxed) {
+            return Err(RunError::Interrupted { when: at(self.reached) });
+        }
+        match self.power.ended() {
+            Some((process, how)) => Err(RunError::Died { process, how, when: at(self.reached) }),
+            None => Ok(()),
+        }
+    }
+
+    /// Remembers the program of a task; an error where the task is not that board's.
+    pub fn note_program(&mut self, board: BoardId, task: u16, program: &[Op]) -> Result<(), RunError> {
+        if self.of_task.get(usize::from(task)) != Some(&board) {
+            return Err(RunError::BadAnswer {
+                board: board.name(),
+                what: format!("a program for task {task}, which is not its own"),
+                when: at(self.reached),
+            });
+        }
+        self.longest[usize::from(task)][0] = program.to_vec();
+        Ok(())
+    }
+
+    /// Remembers the longest rest that a task's board has asked for.
+    pub fn note_rest(&mut self, task: u16, rest: &[Op]) {
+        let longest = &mut self.longest[usize::from(task)][1];
+        if demand(rest) > demand(longest) {
+            longest.clear();
+            longest.extend_from_slice(rest);
+        }
+    }
+
+    /// Sorts the transfers of a window by the board that they are made to.
+    pub fn sort_transfers(&mut self, log: &Log) {
+        self.transfers.iter_mut().for_each(Vec::clear);
+        for transfer in program_transfers(log) {
+            if let Some(slave) = transfer.slave {
+                self.transfers[self.of_slave[usize::from(slave)] as usize].push(transfer.into());
+            }
+        }
+    }
+
+    /// A grant of the current window.
+    pub fn grant_of(&self, board: BoardId, from: Ns, until: Ns, flags: u32) -> Grant {
+        Grant { window: self.window, from, until, board: board as u32, flags, task: 0, job: 0 }
+    }
+
+    /// Grants and waits for the answer.
+    pub fn ask(&mut self, grant: &Grant) -> Result<Answer, RunError> {
+        let board = BOARDS[grant.board as usize];
+        match self.place[board as usize] {
+            None => {
+                let transfers = &self.transfers[board as usize];
+                self.host.step(grant, transfers)
+            }
+            Some(remote) => {
+                self.send_grant(remote, grant)?;
+                self.collect_from(remote, board)
+            }
+        }
+    }
+
+    /// Grants a board in another process its transfers of the window.
+    pub fn send_grant(&mut self, remote: usize, grant: &Grant) -> Result<(), RunError> {
+        let sent = self.remotes[remote].grant(grant, &self.transfers[grant.board as usize]);
+        if sent.is_err() {
+            // a process that has just died is the better explanation
+            self.watch()?;
+        }
+        sent?;
+        if let Some((bells, _)) = &self.bells {
+            bells.ring(self.remotes[remote].bell);
+        }
+        Ok(())
+    }
+
+    /// The board's answer to the current window's grant.
+    pub fn collect_from(&mut self, remote: usize, board: BoardId) -> Result<Answer, RunError> {
+        loop {
+            let (who, window, answer) = self.await_reply(remote)?;
+            if who == BoardId::BusAnalyzer && self.recorder_owes > 0 {
+                self.recorder_owes -= 1;
+                continue;
+            }
+            if who == board && window == self.window {
+                return Ok(answer);
+            }
+            return Err(RunError::BadAnswer {
+                board: who.name(),
+                what: format!("window {window} where `{}` was asked for window {}", board.name(), self.window),
+                when: at(self.reached),
+            });
+        }
+    }
+
+    /// The next answer of a process.
+    pub fn await_reply(&mut self, remote: usize) -> Result<(BoardId, u64, Answer), RunError> {
+        // wall time and processor time of the board, at first and since it was last seen at work
+        let (mut first, mut waiting): (Option<(Instant, u64)>, Option<(Instant, u64)>) = (None, None);
+        loop {
+            if let Some(reply) = self.remotes[remote].reply(self.reached)? {
+                return Ok(reply);
+            }
+            let Some((_, bell)) = &mut self.bells else { continue };
+            if bell.wait(WATCH_PERIOD) {
+                continue;
+            }
+            self.watch()?;
+            let name = &self.remotes[remote].process;
+            let used = self.power.used(name);
+            let (asked, used_at_first) = *first.get_or_insert((Instant::now(), used));
+            let (since, used_before) = *waiting.get_or_insert((Instant::now(), used));
+            let how = if used.saturating_sub(used_at_first) > SPIN_S * rustix::param::clock_ticks_per_second() {
+                Some(format!("it has used {SPIN_S} s of processor time"))
+            } else if since.elapsed() > STALL {
+                self.power.idle(name, used_before).map(str::to_owned)
+            } else {
+                continue;
+            };
+            let Some(how) = how else {
+                // starved, not stalled
+                waiting = None;
+                continue;
+            };
+            return Err(RunError::Stalled {
+                process: name.clone(),
+                how,
+                waited_s: asked.elapsed().as_secs_f64(),
+                when: at(self.reached),
+            });
+        }
+    }
+}
+
+/// Processor time, then accesses: which of two programs asks for more.
+fn demand(program: &[Op]) -> (Ns, usize) {
+    let execution = program.iter().map(|op| if let Op::Exec(ns) = op { *ns } else { 0 });
+    (execution.sum(), program.iter().filter(|op| matches!(op, Op::Access(_))).count())
+}
+
+/// The transfers that the data plane carries out.
+pub(crate) fn program_transfers(log: &Log) -> impl Iterator<Item = &Transfer> {
+    log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program)
+}

@@ -49,7 +49,8 @@ fn service<T: Pod + Debug, H: Pod + Debug>(
 }
 
 impl<T: Pod + Debug, H: Pod + Debug> Sender<T, H> {
-    /// Opens the sending end towards `readers` other processes, each with room for `buffer` messages of at most `length` elements.
+    /// Opens the sending end towards `readers` other processes, each with room for `buffer` messages. Up to `length`
+    /// elements a message needs no new memory; a longer one allocates once.
     pub fn open(
         domain: &Domain,
         name: &str,
@@ -60,6 +61,7 @@ impl<T: Pod + Debug, H: Pod + Debug> Sender<T, H> {
         let publisher = service::<T, H>(domain, name, buffer, readers)?
             .publisher_builder()
             .initial_max_slice_len(length)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|error| ChannelError::Setup {
@@ -126,5 +128,29 @@ impl<T: Pod + Debug, H: Pod + Debug> Port<T, H> {
     /// Name of the channel.
     pub fn name(&self) -> &str {
         &self.name
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_longer_than_the_memory_made_for_it_arrives() {
+        let folder = tempfile::tempdir().expect("folder");
+        let prefix = format!("p{}x_", std::process::id());
+        {
+            let domain = Domain::join(folder.path(), &prefix, "a").expect("domain");
+            let sender = Sender::<u64, u64>::open(&domain, "long", 1, 4, 2).expect("sender");
+            let port = Port::<u64, u64>::open(&domain, "long", 1, 4).expect("port");
+            let payload: Vec<u64> = (0..500).collect();
+            for length in [1, 500, 3] {
+                sender.send(&7, &payload[..length]).expect("send");
+                let mut got: Vec<u64> = Vec::new();
+                port.receive(|_, elements| got.extend(elements)).expect("receive");
+                assert_eq!(got, payload[..length]);
+            }
+        }
+        assert!(crate::remove_leftovers(&prefix).is_empty());
     }
 }

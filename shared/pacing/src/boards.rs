@@ -66,9 +66,11 @@ impl Boards {
         let place = BOARDS.map(|board| process_of(&scenario, board));
         let away: Vec<usize> = (0..scenario.processes.len()).filter(|i| place.contains(&(i + 1))).collect();
         let here: Vec<BoardId> = BOARDS.into_iter().filter(|board| place[*board as usize] == 0).collect();
+        // removed last, where the start fails
+        let mut folder = None;
         let mut power = Power::default();
         let mut remotes = Vec::new();
-        let (mut folder, mut domain, mut bells) = (None, None, None);
+        let (mut domain, mut bells) = (None, None);
         if !away.is_empty() {
             let run_folder = RunFolder::create()?;
             context.prefix = run_folder.prefix.clone();

@@ -19,6 +19,8 @@ const YIELD_LIMIT: Duration = Duration::from_micros(50);
 const BLOCK_AT_ONCE: u32 = 1000;
 /// Yields before blocking.
 const YIELDS: u32 = 20;
+/// Where the shared number lies, in the first bell's words.
+const ROUND_WORD: usize = 2;
 /// Bytes between two bells: a cache line pair each.
 const STRIDE: usize = 128;
 
@@ -61,6 +63,16 @@ impl Bells {
         }
     }
 
+    /// A number that all processes share.
+    pub fn round(&self) -> u32 {
+        self.word(0, ROUND_WORD).load(Ordering::SeqCst)
+    }
+
+    /// Sets it; seen by everybody who hears a later ring.
+    pub fn set_round(&self, round: u32) {
+        self.word(0, ROUND_WORD).store(round, Ordering::SeqCst);
+    }
+
     /// Rings the bell of process `index`.
     pub fn ring(&self, index: usize) {
         let counter = self.word(index, 0);
@@ -78,17 +90,19 @@ impl Bells {
 }
 
 impl Bell {
-    /// Waits until the bell has rung since the last wait, at most `limit`. True where it has.
-    pub fn wait(&mut self, limit: Duration) -> bool {
-        if self.rung() {
-            return true;
+    /// Waits until the bell has rung since the last wait, at most `limit`. How often it has.
+    pub fn wait(&mut self, limit: Duration) -> u32 {
+        let rung = self.rung();
+        if rung > 0 {
+            return rung;
         }
         if self.block_at_once == 0 {
             for _ in 0..YIELDS {
                 let before = Instant::now();
                 std::thread::yield_now();
-                if self.rung() {
-                    return true;
+                let rung = self.rung();
+                if rung > 0 {
+                    return rung;
                 }
                 if before.elapsed() > YIELD_LIMIT {
                     self.block_at_once = BLOCK_AT_ONCE;
@@ -101,7 +115,7 @@ impl Bell {
         self.block(limit)
     }
 
-    fn block(&mut self, limit: Duration) -> bool {
+    fn block(&mut self, limit: Duration) -> u32 {
         let (counter, sleeping) = (self.bells.word(self.index, 0), self.bells.word(self.index, 1));
         let timeout =
             rustix::thread::futex::Timespec { tv_sec: limit.as_secs() as _, tv_nsec: limit.subsec_nanos().into() };
@@ -112,9 +126,10 @@ impl Bell {
         self.rung()
     }
 
-    fn rung(&mut self) -> bool {
+    /// How often the bell has rung since it was last asked.
+    pub fn rung(&mut self) -> u32 {
         let count = self.bells.word(self.index, 0).load(Ordering::SeqCst);
-        let rung = count != self.heard;
+        let rung = count.wrapping_sub(self.heard);
         self.heard = count;
         rung
     }
@@ -130,10 +145,11 @@ mod tests {
         let bells = Bells::open(&folder.path().join("bells"), 2).expect("page");
         let mut bell = bells.bell(1);
         bells.ring(1);
-        assert!(bell.wait(Duration::ZERO));
-        assert!(!bell.wait(Duration::from_millis(1)));
+        bells.ring(1);
+        assert_eq!(bell.wait(Duration::ZERO), 2);
+        assert_eq!(bell.wait(Duration::from_millis(1)), 0);
         bells.ring(0);
-        assert!(!bell.wait(Duration::from_millis(1)));
+        assert_eq!(bell.wait(Duration::from_millis(1)), 0);
     }
 
     #[test]
@@ -147,7 +163,7 @@ mod tests {
             other.ring(0);
         });
         // a long limit: the test's own watchdog, not a promise
-        assert!(bell.wait(Duration::from_secs(30)));
+        assert_eq!(bell.wait(Duration::from_secs(30)), 1);
         ringer.join().expect("ringer");
     }
 }

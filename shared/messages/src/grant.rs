@@ -22,7 +22,14 @@ pub struct Grant {
     pub task: u32,
     /// Its activation number.
     pub job: u32,
+    /// Bell of who has the next turn; [`NOBODY`] = none.
+    pub next: u32,
+    /// Round of turns that it belongs to; void once the shared number of the bells is higher. 0 = never void.
+    pub round: u32,
 }
+
+/// No bell is rung after the board has acted.
+pub const NOBODY: u32 = u32::MAX;
 
 /// Bits of [`Grant::flags`] and [`Reply::flags`].
 pub mod flags {

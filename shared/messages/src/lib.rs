@@ -20,13 +20,13 @@ pub use bus::{BusWord, TransferRecord};
 pub use command::{Command, CommandKind, PathKind};
 pub use control::{ControlProbe, limits};
 pub use event::{Event, EventKind, Severity};
-pub use grant::{Grant, OpRecord, Reply, flags};
+pub use grant::{Grant, NOBODY, OpRecord, Reply, flags};
 pub use header::{Header, Kind};
 pub use plant::{AmplifierCommand, PlantProbe, PlantSample, drive_status};
 pub use telemetry::Telemetry;
 pub use vme::Ns;
 
 /// Version of everything in this crate; channels of different versions never meet.
-pub const PROTOCOL: u32 = 1;
+pub const PROTOCOL: u32 = 2;
 /// Number of joints of the arm.
 pub const JOINTS: usize = 7;

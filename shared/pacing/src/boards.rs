@@ -43,6 +43,10 @@ pub(crate) struct Boards {
     pub reached: Ns,
     /// Grants that the recorder has not answered yet.
     pub recorder_owes: u32,
+    /// Answers to the last round, in the order of its grants.
+    pub answers: Vec<Answer>,
+    /// Number of the round of turns; a new one starts when a window is cut short.
+    round: u32,
     /// Program and longest rest of each task that its board has asked for so far.
     longest: Vec<[Vec<Op>; 2]>,
     interrupted: &'static AtomicBool,
@@ -110,6 +114,8 @@ impl Boards {
             window: 0,
             reached: 0,
             recorder_owes: 0,
+            answers: Vec::with_capacity(BOARDS.len()),
+            round: 1,
             longest: vec![[const { Vec::new() }; 2]; scenario.rack.tasks.len()],
             interrupted,
             processor_kept: processor,
@@ -163,7 +169,7 @@ impl Boards {
     /// Waits a little for the chassis' bell.
     fn listen(&mut self) -> Result<(), RunError> {
         let Some((_, bell)) = &mut self.bells else { return Ok(()) };
-        if !bell.wait(WATCH_PERIOD) {
+        if bell.wait(WATCH_PERIOD) == 0 {
             self.watch()?;
         }
         Ok(())
@@ -214,7 +220,8 @@ impl Boards {
 
     /// A grant of the current window.
     pub fn grant_of(&self, board: BoardId, from: Ns, until: Ns, flags: u32) -> Grant {
-        Grant { window: self.window, from, until, board: board as u32, flags, task: 0, job: 0 }
+        let (board, next) = (board as u32, CHASSIS_BELL as u32);
+        Grant { window: self.window, from, until, board, flags, task: 0, job: 0, next, round: 0 }
     }
 
     /// Grants and waits for the answer.
@@ -232,18 +239,76 @@ impl Boards {
         }
     }
 
-    /// Grants a board in another process its transfers of the window.
+    /// Lets boards act one after the other, each handing the turn on to the next: the chassis is not between. Ends after a
+    /// board that cuts the window short; there are then fewer answers than grants.
+    pub fn take_turns(&mut self, grants: &[Grant]) -> Result<(), RunError> {
+        self.answers.clear();
+        while let Some(first) = grants.get(self.answers.len()) {
+            let away = grants[self.answers.len()..].iter().map_while(|grant| self.place[grant.board as usize]).count();
+            let leg = &grants[self.answers.len()..][..away.max(1)];
+            match self.place[first.board as usize] {
+                None => {
+                    let answer = self.host.step(first, &self.transfers[first.board as usize])?;
+                    self.answers.push(answer);
+                }
+                Some(remote) => {
+                    for (i, grant) in leg.iter().enumerate() {
+                        let after = leg.get(i + 1).and_then(|next| self.place[next.board as usize]);
+                        let next = after.map_or(CHASSIS_BELL, |remote| self.remotes[remote].bell) as u32;
+                        self.put_grant(&Grant { next, round: self.round, ..*grant })?;
+                    }
+                    self.ring(remote);
+                    self.collect_turns(leg)?;
+                }
+            }
+            if self.answers.iter().zip(grants).any(|(answer, grant)| answer.cuts(grant.until)) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn collect_turns(&mut self, leg: &[Grant]) -> Result<(), RunError> {
+        for grant in leg {
+            let board = BOARDS[grant.board as usize];
+            let Some(remote) = self.place[board as usize] else { continue };
+            let answer = self.collect_from(remote, board)?;
+            let cut = answer.cuts(grant.until);
+            self.answers.push(answer);
+            if cut {
+                // the others' grants lie in their queues: void from now on
+                self.round += 1;
+                if let Some((bells, _)) = &self.bells {
+                    bells.set_round(self.round);
+                }
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Grants a board in another process its transfers of the window, and the turn.
     pub fn send_grant(&mut self, remote: usize, grant: &Grant) -> Result<(), RunError> {
+        self.put_grant(grant)?;
+        self.ring(remote);
+        Ok(())
+    }
+
+    /// Gives a process its turn.
+    pub fn ring(&self, remote: usize) {
+        if let Some((bells, _)) = &self.bells {
+            bells.ring(self.remotes[remote].bell);
+        }
+    }
+
+    fn put_grant(&mut self, grant: &Grant) -> Result<(), RunError> {
+        let Some(remote) = self.place[grant.board as usize] else { return Ok(()) };
         let sent = self.remotes[remote].grant(grant, &self.transfers[grant.board as usize]);
         if sent.is_err() {
             // a process that has just died is the better explanation
             self.watch()?;
         }
-        sent?;
-        if let Some((bells, _)) = &self.bells {
-            bells.ring(self.remotes[remote].bell);
-        }
-        Ok(())
+        Ok(sent?)
     }
 
     /// The board's answer to the current window's grant.
@@ -274,7 +339,7 @@ impl Boards {
                 return Ok(reply);
             }
             let Some((_, bell)) = &mut self.bells else { continue };
-            if bell.wait(WATCH_PERIOD) {
+            if bell.wait(WATCH_PERIOD) > 0 {
                 continue;
             }
             self.watch()?;

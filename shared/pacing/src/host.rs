@@ -20,6 +20,13 @@ pub struct Answer {
     pub program: Option<(u16, Vec<Op>)>,
 }
 
+impl Answer {
+    /// Whether the board has cut a window that was to end at `until` short.
+    pub(crate) fn cuts(&self, until: Ns) -> bool {
+        self.early.is_some_and(|early| early < until)
+    }
+}
+
 /// The boards of one process.
 pub struct Host {
     boards: Vec<(BoardId, Box<dyn Board>)>,

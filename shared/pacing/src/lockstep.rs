@@ -7,10 +7,10 @@
 
 use crate::boards::{Boards, program_transfers};
 use crate::error::at;
-use crate::host::{Answer, Factory};
+use crate::host::Factory;
 use crate::{Context, RunError};
 use board::{BoardId, Mail, Ns, Op};
-use messages::{BOARDS, Event, EventKind, Severity, TransferRecord, flags};
+use messages::{BOARDS, Event, EventKind, Grant, NOBODY, Severity, TransferRecord, flags};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use vme::{Log, Stop, Timing};
@@ -19,6 +19,11 @@ use vme::{Log, Stop, Timing};
 const MAX_WINDOW: Ns = 10 * vme::MILLISECOND;
 /// Windows that the recorder may lag; then time waits.
 const RECORDER_CREDIT: u32 = 64;
+/// The boards on the wires, in the order in which signals pass them.
+const WIRES: [BoardId; 4] = [BoardId::DaIo, BoardId::HwSim, BoardId::ForceSensorIf, BoardId::EncoderIf];
+/// Those that act when the arm has cut a window short; the arm itself has.
+const WIRES_AGAIN: [BoardId; 3] = [BoardId::DaIo, BoardId::ForceSensorIf, BoardId::EncoderIf];
+
 /// Whether the run goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
@@ -42,6 +47,8 @@ pub struct Lockstep {
     /// Rest of the jobs of each task, as its board last said.
     rest: Vec<Vec<Op>>,
     log: Log,
+    /// Grants of the last round.
+    turns: Vec<Grant>,
     own_mail: Mail,
 }
 
@@ -61,6 +68,7 @@ impl Lockstep {
             timing,
             boards,
             log: Log::default(),
+            turns: Vec::with_capacity(BOARDS.len()),
             own_mail: Mail::default(),
         })
     }
@@ -129,10 +137,11 @@ impl Lockstep {
         let mut stop = self.look_ahead(limit);
         let mut until = self.ahead.now();
 
-        let answer = self.visit(BoardId::DaIo, from, until, 0)?;
-        self.expect_no_early(BoardId::DaIo, &answer)?;
-        let answer = self.visit(BoardId::HwSim, from, until, 0)?;
-        if let Some(early) = answer.early.filter(|early| *early < until) {
+        self.plan_turns(&WIRES, from, until, stop);
+        self.boards.take_turns(&self.turns)?;
+        if self.boards.answers.len() < self.turns.len()
+            && let Some((BoardId::HwSim, early)) = self.cut()
+        {
             if early <= from {
                 return Err(RunError::BadAnswer {
                     board: BoardId::HwSim.name(),
@@ -142,40 +151,12 @@ impl Lockstep {
             }
             stop = self.look_ahead(early);
             until = early;
-            self.visit(BoardId::DaIo, from, until, flags::RERUN)?;
+            self.plan_turns(&WIRES_AGAIN, from, until, stop);
+            self.turns[0].flags |= flags::RERUN;
+            self.boards.take_turns(&self.turns)?;
         }
-        self.grant(BoardId::ForceSensorIf, from, until, 0)?;
-        self.grant(BoardId::EncoderIf, from, until, 0)?;
-        self.collect(BoardId::ForceSensorIf)?;
-        self.collect(BoardId::EncoderIf)?;
-
-        let decision = match stop {
-            Stop::Decision { task, job } => Some((task, job)),
-            _ => None,
-        };
-        for board in [BoardId::ControlComputer, BoardId::Workstation] {
-            let decides = decision.filter(|(task, _)| self.boards.of_task[usize::from(*task)] == board);
-            if decides.is_none() && self.boards.transfers[board as usize].is_empty() {
-                continue;
-            }
-            let mut grant = self.boards.grant_of(board, from, until, 0);
-            if let Some((task, job)) = decides {
-                grant.flags = flags::DECIDE;
-                (grant.task, grant.job) = (task.into(), job);
-            }
-            let answer = self.boards.ask(&grant)?;
-            self.expect_no_early(board, &answer)?;
-            if let Some((task, _)) = decides {
-                if let Some(rest) = answer.rest {
-                    self.boards.note_rest(task, &rest);
-                    self.rest[usize::from(task)] = rest;
-                }
-                self.ahead.resume(task, &self.rest[usize::from(task)]);
-            }
-            if let Some((task, program)) = answer.program {
-                self.boards.note_program(board, task, &program)?;
-                self.ahead.set_program(task, &program);
-            }
+        for i in 0..self.turns.len() {
+            self.answered(i)?;
         }
         self.own_mail.clear();
         if let Stop::Overrun { task, job } = stop {
@@ -209,8 +190,13 @@ impl Lockstep {
             self.boards.host.step(&grant, &[])?;
             return Ok(());
         };
-        self.grant(recorder, from, until, 0)?;
+        let mut grant = self.boards.grant_of(recorder, from, until, 0);
         self.boards.recorder_owes += 1;
+        if !self.boards.recorder_owes.is_multiple_of(RECORDER_CREDIT / 4) {
+            // its answer is not worth waking the chassis
+            grant.next = NOBODY;
+        }
+        self.boards.send_grant(remote, &grant)?;
         while self.boards.remotes[remote].reply(until)?.is_some() {
             self.boards.recorder_owes -= 1;
         }
@@ -221,38 +207,56 @@ impl Lockstep {
         Ok(())
     }
 
-    fn visit(&mut self, board: BoardId, from: Ns, until: Ns, flags: u32) -> Result<Answer, RunError> {
-        let grant = self.boards.grant_of(board, from, until, flags);
-        self.boards.ask(&grant)
+    /// Who has a turn in a window: the boards on the wires, then the masters that decide or were written to.
+    fn plan_turns(&mut self, wires: &[BoardId], from: Ns, until: Ns, stop: Stop) {
+        self.turns.clear();
+        self.turns.extend(wires.iter().map(|board| self.boards.grant_of(*board, from, until, 0)));
+        for board in [BoardId::ControlComputer, BoardId::Workstation] {
+            let mut grant = self.boards.grant_of(board, from, until, 0);
+            if let Stop::Decision { task, job } = stop
+                && self.boards.of_task[usize::from(task)] == board
+            {
+                grant.flags = flags::DECIDE;
+                (grant.task, grant.job) = (task.into(), job);
+            } else if self.boards.transfers[board as usize].is_empty() {
+                continue;
+            }
+            self.turns.push(grant);
+        }
     }
 
-    fn expect_no_early(&self, board: BoardId, answer: &Answer) -> Result<(), RunError> {
-        match answer.early {
-            None => Ok(()),
-            Some(early) => Err(RunError::BadAnswer {
+    /// The board that cut the last round short, and to when.
+    fn cut(&self) -> Option<(BoardId, Ns)> {
+        let last = self.boards.answers.len().checked_sub(1)?;
+        Some((BOARDS[self.turns[last].board as usize], self.boards.answers[last].early?))
+    }
+
+    /// Takes in what a board answered in its turn.
+    fn answered(&mut self, turn: usize) -> Result<(), RunError> {
+        let grant = self.turns[turn];
+        let board = BOARDS[grant.board as usize];
+        let answer = self.boards.answers.get_mut(turn).map(std::mem::take).unwrap_or_default();
+        if let Some(early) = answer.early
+            && board != BoardId::HwSim
+        {
+            return Err(RunError::BadAnswer {
                 board: board.name(),
                 what: format!("an early return at {early} ns; only hw_sim may cut a window"),
                 when: at(self.timing.now()),
-            }),
+            });
         }
-    }
-
-    /// Grants without waiting; boards in the chassis act at once.
-    fn grant(&mut self, board: BoardId, from: Ns, until: Ns, flags: u32) -> Result<(), RunError> {
-        let grant = self.boards.grant_of(board, from, until, flags);
-        match self.boards.place[board as usize] {
-            None => self.boards.host.step(&grant, &self.boards.transfers[board as usize]).map(|_| ()),
-            Some(remote) => self.boards.send_grant(remote, &grant),
-        }
-    }
-
-    fn collect(&mut self, board: BoardId) -> Result<(), RunError> {
-        match self.boards.place[board as usize] {
-            None => Ok(()),
-            Some(remote) => {
-                let answer = self.boards.collect_from(remote, board)?;
-                self.expect_no_early(board, &answer)
+        if grant.flags & flags::DECIDE != 0 {
+            let task = grant.task as u16;
+            if let Some(rest) = answer.rest {
+                self.boards.note_rest(task, &rest);
+                self.rest[usize::from(task)] = rest;
             }
+            self.ahead.resume(task, &self.rest[usize::from(task)]);
         }
+        if let Some((task, program)) = answer.program {
+            self.boards.note_program(board, task, &program)?;
+            self.ahead.set_program(task, &program);
+        }
+        Ok(())
     }
 }

@@ -85,9 +85,7 @@ impl Realtime {
         let start = Grant { from: zero, flags: flags::START, ..boards.grant_of(BoardId::Chassis, 0, 0, 0) };
         for remote in 0..boards.remotes.len() {
             boards.remotes[remote].grant(&start, &[])?;
-            if let Some((bells, _)) = &boards.bells {
-                bells.ring(boards.remotes[remote].bell);
-            }
+            boards.ring(remote);
         }
         let plan = Plan::new(timing);
         let debts = boards.remotes.iter().map(|_| Debt { grants: 0, since: Instant::now(), used: None }).collect();

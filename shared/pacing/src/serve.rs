@@ -6,7 +6,7 @@ use crate::remote::{Line, READY};
 use crate::{RunError, RunFolder};
 use board::BoardId;
 use channels::{Bells, Domain, Exchange, wall_ns};
-use messages::{BOARDS, Grant, flags};
+use messages::{BOARDS, Grant, NOBODY, flags};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -61,8 +61,16 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
     bells.ring(CHASSIS_BELL);
     let mut until = 0;
     let mut paced: Option<Paced> = None;
+    // how many grants it may act on
+    let mut turns = 0;
     loop {
-        while let Some(grant) = line.grant(&mut transfers)? {
+        turns += bell.rung();
+        while turns > 0 || paced.is_some() {
+            let Some(grant) = line.grant(&mut transfers)? else { break };
+            if grant.round != 0 && grant.round < bells.round() {
+                continue;
+            }
+            turns = turns.saturating_sub(1);
             if grant.flags & flags::START != 0 {
                 // refused rights are the chassis' to tell, once for all
                 realtime::ask_for_rights(&context.scenario.realtime);
@@ -78,7 +86,12 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
             until = grant.until;
             let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
             line.reply(board, grant.window, &answer)?;
-            bells.ring(CHASSIS_BELL);
+            match grant.next {
+                _ if answer.cuts(until) => bells.ring(CHASSIS_BELL),
+                NOBODY => {}
+                next => bells.ring(next as usize),
+            }
+            turns += bell.rung();
         }
         if let Some(paced) = &mut paced
             && let Some(due) = paced.due()
@@ -98,7 +111,9 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
             }
             continue;
         }
-        if !bell.wait(LIFELINE_PERIOD) && lifeline_cut() {
+        let rung = bell.wait(LIFELINE_PERIOD);
+        turns += rung;
+        if rung == 0 && lifeline_cut() {
             if here.contains(&BoardId::BusAnalyzer) {
                 // the record up to here is worth keeping
                 host.step(&closing_grant(BoardId::BusAnalyzer, until), &[])?;
@@ -109,7 +124,8 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
 }
 
 pub(crate) fn closing_grant(board: BoardId, until: vme::Ns) -> Grant {
-    Grant { window: u64::MAX - 1, from: until, until, board: board as u32, flags: flags::FINISH, task: 0, job: 0 }
+    let (board, flags) = (board as u32, flags::FINISH);
+    Grant { window: u64::MAX - 1, from: until, until, board, flags, task: 0, job: 0, next: NOBODY, round: 0 }
 }
 
 /// Number of the process that hosts the board; the chassis is 0. Boards of a process named `chassis` live in it.

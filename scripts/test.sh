@@ -7,5 +7,6 @@ source scripts/setup.sh
 python3 -c 'import venv, ensurepip' 2>/dev/null || need_packages python3 python3-venv
 ./scripts/python-env.sh >/dev/null
 
-cargo build --workspace --bins --locked
+# with the tests, so that packages are built once for both
+cargo build --workspace --bins --tests --examples --locked
 cargo test --workspace --locked --no-fail-fast "$@"

@@ -3,7 +3,10 @@
 use crate::ChannelError;
 use iceoryx2::prelude::*;
 use std::path::{Path as StdPath, PathBuf};
+use std::time::Duration;
 
+/// How long a process waits for another that is opening the same channel.
+const PATIENCE: Duration = Duration::from_secs(20);
 /// Folder of the shared-memory files.
 const SHARED_MEMORY: &str = "/dev/shm";
 
@@ -27,6 +30,8 @@ impl Domain {
         let root = Path::new(root.as_os_str().as_encoded_bytes())
             .map_err(|error| setup("placing the domain", format!("{}: {error:?}", root.display())))?;
         config.global.set_root_path(&root);
+        // a process of a loaded machine may be kept waiting in the middle of opening a channel
+        config.global.creation_timeout = PATIENCE;
         // while a run lives only the chassis cleans, and it removes the whole domain
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;

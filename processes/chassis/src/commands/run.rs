@@ -75,7 +75,8 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
             failed = true;
         }
         losses |= finished.record_lost;
-        if let Some(record) = &record {
+        // a run that ends before it begins has none
+        if let Some(record) = record.as_ref().filter(|record| !failed || record.exists()) {
             match settle_record(record, finished.error.is_some()) {
                 Ok(digest) => result.digest = Some(digest),
                 Err(reason) => {

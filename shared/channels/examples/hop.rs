@@ -25,9 +25,15 @@ fn main() -> Result<()> {
     let prefix = format!("hop{}_", std::process::id());
     println!("{:10} {:>10} {:>10} {:>10}", "one way", "p50 ns", "p99 ns", "min ns");
     for mode in ["pipe", "polled", "bell"] {
-        let mut times = if mode == "pipe" { ask_pipe(folder.path(), &prefix)? } else { ask_channel(folder.path(), &prefix, mode)? };
+        let mut times =
+            if mode == "pipe" { ask_pipe(folder.path(), &prefix)? } else { ask_channel(folder.path(), &prefix, mode)? };
         times.sort_unstable();
-        println!("{mode:10} {:>10} {:>10} {:>10}", times[times.len() / 2] / 2, times[times.len() * 99 / 100] / 2, times[0] / 2);
+        println!(
+            "{mode:10} {:>10} {:>10} {:>10}",
+            times[times.len() / 2] / 2,
+            times[times.len() * 99 / 100] / 2,
+            times[0] / 2
+        );
     }
     channels::remove_leftovers(&prefix);
     Ok(())
@@ -40,7 +46,9 @@ fn echo(mode: &str, folder: &Path, prefix: &str) -> Result<std::process::Child> 
 
 fn ask_pipe(folder: &Path, prefix: &str) -> Result<Vec<u64>> {
     let mut child = echo("pipe", folder, prefix)?;
-    let (Some(mut to), Some(mut from)) = (child.stdin.take(), child.stdout.take()) else { return Err("no pipes".into()) };
+    let (Some(mut to), Some(mut from)) = (child.stdin.take(), child.stdout.take()) else {
+        return Err("no pipes".into());
+    };
     let mut bytes = [7; SIZE];
     let mut times = Vec::with_capacity(ROUNDS);
     for _ in 0..ROUNDS {

@@ -2,7 +2,7 @@
 //!
 //! A waiter first yields the processor a few times, since the ringer usually runs on it next, then blocks. On a
 //! machine with busy hogs a yield lasts a whole time slice: when one took over [`YIELD_LIMIT`], the next
-//! [`BLOCK_AT_ONCE`] waits block at once. The choice comes from the benchmark `bells` of this crate.
+//! [`BLOCK_AT_ONCE`] waits block at once.
 
 use crate::ChannelError;
 use memmap2::MmapMut;
@@ -75,8 +75,13 @@ impl Bells {
 
     /// Rings the bell of process `index`.
     pub fn ring(&self, index: usize) {
+        self.ring_times(index, 1);
+    }
+
+    /// Rings it so many times, with one wake-up.
+    pub fn ring_times(&self, index: usize, times: u32) {
         let counter = self.word(index, 0);
-        counter.fetch_add(1, Ordering::SeqCst);
+        counter.fetch_add(times, Ordering::SeqCst);
         if self.word(index, 1).load(Ordering::SeqCst) != 0 {
             // a failed wake only means that nobody sleeps
             let _ = futex::wake(counter, futex::Flags::empty(), i32::MAX as u32);

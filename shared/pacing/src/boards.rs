@@ -10,7 +10,7 @@ use crate::serve::{CHASSIS_BELL, process_of};
 use crate::{Context, Power, RunError, RunFolder};
 use board::{BoardId, Ns, Op};
 use channels::{Bell, Bells, Domain, Exchange};
-use messages::{BOARDS, Grant, TransferRecord, flags};
+use messages::{BOARDS, Grant, NOBODY, TransferRecord, flags};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use vme::{Log, Origin, Timing, Transfer};
@@ -19,6 +19,10 @@ use vme::{Log, Origin, Timing, Transfer};
 pub(crate) const WATCH_PERIOD: Duration = Duration::from_millis(50);
 /// No answer for this long and no sign of life: stalled.
 pub(crate) const STALL: Duration = Duration::from_secs(5);
+/// Windows that the recorder may lag; then time waits.
+const RECORDER_CREDIT: u32 = 64;
+/// Windows for which the recorder is woken at once: a wake-up on another processor costs more than a window's record.
+const RECORDER_BATCH: u32 = 16;
 /// Processor time that no single answer takes.
 const SPIN_S: u64 = 5;
 /// Processes get this long to report ready.
@@ -41,8 +45,11 @@ pub(crate) struct Boards {
     pub window: u64,
     /// Simulated time reached.
     pub reached: Ns,
-    /// Grants that the recorder has not answered yet.
+    /// Grants that the recorder has not answered yet, and those of them that it has not been woken for.
     pub recorder_owes: u32,
+    recorder_sleeps: u32,
+    /// Windows for which it is woken at once.
+    recorder_batch: u32,
     /// Answers to the last round, in the order of its grants.
     pub answers: Vec<Answer>,
     /// Number of the round of turns; a new one starts when a window is cut short.
@@ -102,6 +109,8 @@ impl Boards {
             }
         }
         let board_named = |name: &str| BoardId::from_name(name).unwrap_or(BoardId::Chassis);
+        let recorder = place[BoardId::BusAnalyzer as usize];
+        let alone = place.iter().filter(|process| **process == recorder).count() == 1;
         let mut boards = Boards {
             host,
             remotes,
@@ -114,6 +123,9 @@ impl Boards {
             window: 0,
             reached: 0,
             recorder_owes: 0,
+            recorder_sleeps: 0,
+            // in a process with others, its grants must not stand in theirs' way
+            recorder_batch: if alone { RECORDER_BATCH } else { 1 },
             answers: Vec::with_capacity(BOARDS.len()),
             round: 1,
             longest: vec![[const { Vec::new() }; 2]; scenario.rack.tasks.len()],
@@ -285,6 +297,41 @@ impl Boards {
             }
         }
         Ok(())
+    }
+
+    /// Grants the recorder the window and does not wait for it; it is woken for some windows at a time, and may lag by
+    /// [`RECORDER_CREDIT`].
+    pub fn grant_recorder(&mut self, grant: &Grant) -> Result<(), RunError> {
+        let board = BoardId::BusAnalyzer as usize;
+        let Some(remote) = self.place[board] else {
+            self.host.step(grant, &[])?;
+            return Ok(());
+        };
+        self.recorder_owes += 1;
+        self.recorder_sleeps += 1;
+        let wake = self.recorder_sleeps >= self.recorder_batch;
+        // no other answer is worth waking the chassis
+        self.put_grant(&Grant { next: if wake { grant.next } else { NOBODY }, ..*grant })?;
+        if wake {
+            self.wake_recorder();
+        }
+        while self.remotes[remote].reply(self.reached)?.is_some() {
+            self.recorder_owes -= 1;
+        }
+        while self.recorder_owes >= RECORDER_CREDIT {
+            self.await_reply(remote)?;
+            self.recorder_owes -= 1;
+        }
+        Ok(())
+    }
+
+    /// Gives the recorder the turns for the grants that it has.
+    pub fn wake_recorder(&mut self) {
+        if let (Some((bells, _)), Some(remote)) = (&self.bells, self.place[BoardId::BusAnalyzer as usize])
+            && self.recorder_sleeps > 0
+        {
+            bells.ring_times(self.remotes[remote].bell, std::mem::take(&mut self.recorder_sleeps));
+        }
     }
 
     /// Grants a board in another process its transfers of the window, and the turn.

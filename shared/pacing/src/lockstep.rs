@@ -10,15 +10,13 @@ use crate::error::at;
 use crate::host::Factory;
 use crate::{Context, RunError};
 use board::{BoardId, Mail, Ns, Op};
-use messages::{BOARDS, Event, EventKind, Grant, NOBODY, Severity, TransferRecord, flags};
+use messages::{BOARDS, Event, EventKind, Grant, Severity, TransferRecord, flags};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use vme::{Log, Stop, Timing};
 
 /// Longest window: bounds what a board has to keep.
 const MAX_WINDOW: Ns = 10 * vme::MILLISECOND;
-/// Windows that the recorder may lag; then time waits.
-const RECORDER_CREDIT: u32 = 64;
 /// The boards on the wires, in the order in which signals pass them.
 const WIRES: [BoardId; 4] = [BoardId::DaIo, BoardId::HwSim, BoardId::ForceSensorIf, BoardId::EncoderIf];
 /// Those that act when the arm has cut a window short; the arm itself has.
@@ -122,6 +120,7 @@ impl Lockstep {
     /// Ends the run: the recorder closes its file, the processes leave. Returns what the boards still had to say.
     pub fn finish(mut self) -> Result<(), RunError> {
         let now = self.timing.now();
+        self.boards.wake_recorder();
         for board in &BOARDS[1..] {
             let grant = self.boards.grant_of(*board, now, now, flags::FINISH);
             self.boards.ask(&grant)?;
@@ -180,31 +179,12 @@ impl Lockstep {
         stop
     }
 
-    /// The recorder gets the window's transfers and a grant, and is not waited for.
+    /// The recorder gets the window's transfers and a grant.
     fn record(&mut self, from: Ns, until: Ns) -> Result<(), RunError> {
         self.own_mail.transfers.extend(program_transfers(&self.log).map(TransferRecord::from));
         self.boards.host.send(&self.own_mail)?;
-        let recorder = BoardId::BusAnalyzer;
-        let Some(remote) = self.boards.place[recorder as usize] else {
-            let grant = self.boards.grant_of(recorder, from, until, 0);
-            self.boards.host.step(&grant, &[])?;
-            return Ok(());
-        };
-        let mut grant = self.boards.grant_of(recorder, from, until, 0);
-        self.boards.recorder_owes += 1;
-        if !self.boards.recorder_owes.is_multiple_of(RECORDER_CREDIT / 4) {
-            // its answer is not worth waking the chassis
-            grant.next = NOBODY;
-        }
-        self.boards.send_grant(remote, &grant)?;
-        while self.boards.remotes[remote].reply(until)?.is_some() {
-            self.boards.recorder_owes -= 1;
-        }
-        while self.boards.recorder_owes >= RECORDER_CREDIT {
-            self.boards.await_reply(remote)?;
-            self.boards.recorder_owes -= 1;
-        }
-        Ok(())
+        let grant = self.boards.grant_of(BoardId::BusAnalyzer, from, until, 0);
+        self.boards.grant_recorder(&grant)
     }
 
     /// Who has a turn in a window: the boards on the wires, then the masters that decide or were written to.

@@ -116,6 +116,12 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
         if rung == 0 && lifeline_cut() {
             if here.contains(&BoardId::BusAnalyzer) {
                 // the record up to here is worth keeping
+                while let Some(grant) = line.grant(&mut transfers)? {
+                    if grant.board == BoardId::BusAnalyzer as u32 {
+                        host.step(&grant, &transfers)?;
+                        until = grant.until;
+                    }
+                }
                 host.step(&closing_grant(BoardId::BusAnalyzer, until), &[])?;
             }
             return Ok(());

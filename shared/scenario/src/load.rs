@@ -21,6 +21,8 @@ pub struct Document {
     text: String,
     folder: PathBuf,
     tree: Table,
+    /// Keys that the command line has set, and the words that set them.
+    set: Vec<(String, String)>,
 }
 
 /// Reads the scenario of that name or path and applies `overrides` (`key.path=value`). The whole of it,
@@ -37,19 +39,20 @@ impl Document {
             Some(text) => (name_or_path.to_owned(), text.to_owned(), PathBuf::new()),
             None => read_file(name_or_path)?,
         };
-        let name = Path::new(&file).file_stem().map_or_else(|| "scenario".into(), |stem| stem.to_string_lossy().into_owned());
-        let mut document = Document { name, file, text, folder, tree: Table::new() };
-        document.tree = document.text.parse::<Table>().map_err(|error| {
-            document.text_error("(file)", error.message(), error.span().unwrap_or(0..0))
-        })?;
+        let name =
+            Path::new(&file).file_stem().map_or_else(|| "scenario".into(), |stem| stem.to_string_lossy().into_owned());
+        let mut document = Document { name, file, text, folder, tree: Table::new(), set: Vec::new() };
+        document.tree = document
+            .text
+            .parse::<Table>()
+            .map_err(|error| document.text_error("(file)", error.message(), error.span().unwrap_or(0..0)))?;
         complete_rack(&mut document.tree);
         for setting in settings {
-            let apply = || {
-                let (key, value) = overrides::parse(setting)?;
-                Ok((key, value))
-            };
-            let (key, value) = apply().map_err(|problem| from_override("--set", problem))?;
-            overrides::set(&mut document.tree, &key, value).map_err(|problem| from_override("--set", problem))?;
+            let origin = format!("--set {setting}");
+            let key = overrides::parse(setting)
+                .and_then(|(key, value)| overrides::set(&mut document.tree, &key, value))
+                .map_err(|problem| from_override(&origin, problem))?;
+            document.set.push((key, origin));
         }
         Ok(document)
     }
@@ -82,7 +85,9 @@ impl Document {
     /// This scenario with one more override.
     pub fn with(&self, key: &str, value: Value) -> Result<Document, ScenarioError> {
         let mut document = self.clone();
-        overrides::vary(&mut document.tree, key, value).map_err(|problem| from_override("--vary", problem))?;
+        let origin = format!("{key}={value}");
+        let key = overrides::vary(&mut document.tree, key, value).map_err(|problem| from_override(&origin, problem))?;
+        document.set.push((key, origin));
         Ok(document)
     }
 
@@ -104,6 +109,10 @@ impl Document {
 
     /// An error with the line of its key, or of the closest key above it that stands in the text.
     fn locate(&self, problem: Problem, variant: Option<&str>) -> ScenarioError {
+        let set = self.set.iter().rev().find(|(key, _)| is_within(&problem.key, key) || is_within(key, &problem.key));
+        if let Some((_, origin)) = set {
+            return from_override(origin, problem);
+        }
         let span = DeTable::parse(&self.text).ok().map(|root| span_of(root.get_ref(), &problem.key));
         match (span, variant) {
             (Some(Found::Whole(span)), _) => self.text_error(&problem.key, &problem.message, span),
@@ -173,6 +182,11 @@ fn read_file(path: &str) -> Result<(String, String, PathBuf), ScenarioError> {
     Ok((path.to_owned(), text, folder))
 }
 
+/// Whether `key` is `table` or lies in it.
+fn is_within(key: &str, table: &str) -> bool {
+    key.strip_prefix(table).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+}
+
 fn from_override(origin: &str, problem: Problem) -> ScenarioError {
     ScenarioError::Override { origin: origin.to_owned(), key: problem.key, message: problem.message }
 }
@@ -215,7 +229,11 @@ fn span_of(root: &DeTable<'_>, key: &str) -> Found {
             match table.get_key_value(part) {
                 Some((name, value)) => {
                     // `[[segment]]` spans its header only through its key
-                    span = if value.get_ref().is_table() || value.get_ref().is_array() { name.span() } else { value.span() };
+                    span = if value.get_ref().is_table() || value.get_ref().is_array() {
+                        name.span()
+                    } else {
+                        value.span()
+                    };
                     Some(value)
                 }
                 None => None,

@@ -24,6 +24,7 @@ enum Command {
     Bus(commands::bus::BusArgs),
     Design(commands::design::DesignArgs),
     Sweep(commands::sweep::SweepArgs),
+    Margin(commands::margin::MarginArgs),
     /// Hosts the boards of one process; `vmerack run` starts it.
     #[command(hide = true)]
     Host {
@@ -53,6 +54,7 @@ pub fn main() -> ExitCode {
         Command::Bus(args) => commands::bus::run(args),
         Command::Design(args) => commands::design::run(args),
         Command::Sweep(args) => commands::sweep::run(args),
+        Command::Margin(args) => commands::margin::run(args),
         Command::Host { .. } => Ok(0),
     };
     match outcome {

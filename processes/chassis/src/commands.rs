@@ -4,6 +4,7 @@ pub mod arm;
 pub mod bus;
 pub mod design;
 pub mod log;
+pub mod margin;
 pub mod run;
 pub mod scenario;
 pub mod scenarios;

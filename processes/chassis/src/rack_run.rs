@@ -130,18 +130,23 @@ fn carry_out(
 pub fn rehearse(scenario: &Scenario) -> Result<(Vec<Program>, BusAccount), String> {
     let periods = scenario.rack.tasks.iter().map(|task| task.period_ns);
     let end = 3 * periods.max().unwrap_or(vme::MILLISECOND);
-    let scenario = Scenario { processes: vec![everything_in_the_chassis()], ..scenario.clone() };
-    let mut listener = Listener(Accounting::new(&scenario).map_err(|error| error.to_string())?);
-    let context = Context { prefix: String::new(), variant: String::new(), record: None, scenario };
-    let run = || -> Result<Lockstep, RunError> {
-        let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
-        rack.run(end, &mut listener)?;
-        Ok(rack)
-    };
-    let rack = run().map_err(|error| error.to_string())?;
+    let mut listener = Listener(Accounting::new(scenario).map_err(|error| error.to_string())?);
+    let rack = listen(scenario, end, &mut listener)?;
     let programs = rack.programs();
     let account = listener.0.close(rack.timing(), &programs);
     Ok((programs, account))
+}
+
+/// Runs the start of a scenario in this process, up to `end`, for somebody who listens.
+pub fn listen(scenario: &Scenario, end: Ns, observer: &mut dyn Observer) -> Result<Lockstep, String> {
+    let scenario = Scenario { processes: vec![everything_in_the_chassis()], ..scenario.clone() };
+    let context = Context { prefix: String::new(), variant: String::new(), record: None, scenario };
+    let run = || -> Result<Lockstep, RunError> {
+        let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
+        rack.run(end, observer)?;
+        Ok(rack)
+    };
+    run().map_err(|error| error.to_string())
 }
 
 struct Listener(Accounting);

@@ -15,9 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .zip(errors)
         .map(|((variant, scenario), error)| made_up::result(variant, scenario, error))
         .collect();
-    results
-        .iter_mut()
-        .for_each(|result| result.wall_s = Some(0.2));
+    results.iter_mut().for_each(|result| result.wall_s = Some(0.2));
     let points = [0.0, 0.5, 1.0, 1.5, 2.0].into_iter().flat_map(|factor| {
         let (variant, scenario) = &variants[0];
         let (other, other_scenario) = &variants[1];
@@ -27,10 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             SweepPoint::new(factor, &made_up::result(other, other_scenario, original)),
         ]
     });
-    let sweep = Sweep {
-        key: "plant.friction_scale".into(),
-        points: points.collect(),
-    };
+    let sweep = Sweep { key: "plant.friction_scale".into(), points: points.collect() };
     let report = RunReport::new("table-5-3", &variants[0].1, "made up", results, vec![sweep]);
     report.write(folder.as_ref())?;
     print!("{}", report::text::render(&report));

@@ -16,17 +16,8 @@ pub(crate) const MASTER_HEADINGS: [&str; 10] = [
     "BERR*",
     "access timer",
 ];
-pub(crate) const TASK_HEADINGS: [&str; 9] = [
-    "task",
-    "jobs",
-    "lost",
-    "accesses/job",
-    "bus/job µs",
-    "access max µs",
-    "bound µs",
-    "response max µs",
-    "bound µs",
-];
+pub(crate) const TASK_HEADINGS: [&str; 9] =
+    ["task", "jobs", "lost", "accesses/job", "bus/job µs", "access max µs", "bound µs", "response max µs", "bound µs"];
 pub(crate) const AGE_HEADINGS: [&str; 6] = ["age at the decision", "n", "min µs", "p50 µs", "p99 µs", "max µs"];
 pub(crate) const WATERFALL_HEADINGS: [&str; 3] = ["sensor to actuator", "mean µs", "in the longest job µs"];
 
@@ -88,9 +79,8 @@ pub(crate) fn tasks(bus: &BusAccount) -> Vec<Vec<String>> {
 
 /// One row per part, the whole last.
 pub(crate) fn waterfall(account: &WaterfallAccount) -> Vec<Vec<String>> {
-    let row = |name: &str, sum, longest| {
-        vec![name.to_owned(), format!("{:.3}", 1e-3 * account.mean_ns(sum)), micro(longest)]
-    };
+    let row =
+        |name: &str, sum, longest| vec![name.to_owned(), format!("{:.3}", 1e-3 * account.mean_ns(sum)), micro(longest)];
     let parts = account.parts.iter().map(|part| row(part_name(part.part), part.sum_ns, part.in_longest_ns));
     parts.chain([row("whole", account.whole_sum_ns, account.whole_max_ns)]).collect()
 }

@@ -61,21 +61,10 @@ pub(crate) struct Span {
 
 /// All pictures of a report.
 pub(crate) fn charts(report: &RunReport) -> Vec<Chart> {
-    let end = report
-        .variants
-        .iter()
-        .map(|variant| variant.simulated_s)
-        .fold(0.0, f64::max);
-    let densest = report
-        .variants
-        .iter()
-        .map(|variant| variant.curves.force.t.len())
-        .max()
-        .unwrap_or(0);
+    let end = report.variants.iter().map(|variant| variant.simulated_s).fold(0.0, f64::max);
+    let densest = report.variants.iter().map(|variant| variant.curves.force.t.len()).max().unwrap_or(0);
     let n = densest.clamp(2, POINTS);
-    let grid: Vec<f64> = (0..n)
-        .map(|i| round(end * i as f64 / (n - 1) as f64, 4))
-        .collect();
+    let grid: Vec<f64> = (0..n).map(|i| round(end * i as f64 / (n - 1) as f64, 4)).collect();
     let axis = report.axis;
     let line = |label: &str, color: usize, of: &Series, scale: f64| Line {
         label: label.to_owned(),
@@ -98,14 +87,7 @@ pub(crate) fn charts(report: &RunReport) -> Vec<Chart> {
         }
         let single = shown.len() == 1;
         shown.into_iter().map(move |(name, ideal)| {
-            (
-                if single {
-                    "ideal impedance".to_owned()
-                } else {
-                    format!("ideal of {name}")
-                },
-                ideal,
-            )
+            (if single { "ideal impedance".to_owned() } else { format!("ideal of {name}") }, ideal)
         })
     };
     let reference = |label: String, of: &Series, scale: f64| Line {
@@ -114,21 +96,10 @@ pub(crate) fn charts(report: &RunReport) -> Vec<Chart> {
         dashed: true,
         y: sample(of, &grid, scale),
     };
-    let chart = |title: String, unit, lines, boxes, tall| Chart {
-        title,
-        unit,
-        t: grid.clone(),
-        lines,
-        boxes,
-        tall,
-    };
+    let chart = |title: String, unit, lines, boxes, tall| Chart { title, unit, t: grid.clone(), lines, boxes, tall };
 
-    let mut force = vec![Line {
-        label: "F_d".into(),
-        color: Paint::Command,
-        dashed: true,
-        y: commanded(report, &grid),
-    }];
+    let mut force =
+        vec![Line { label: "F_d".into(), color: Paint::Command, dashed: true, y: commanded(report, &grid) }];
     let mut position = Vec::new();
     let mut error = Vec::new();
     for (i, variant) in report.variants.iter().enumerate() {
@@ -146,54 +117,15 @@ pub(crate) fn charts(report: &RunReport) -> Vec<Chart> {
     force.extend(ideals().map(|(label, ideal)| reference(label, &ideal.force, 1.0)));
     position.extend(ideals().map(|(label, ideal)| reference(label, &ideal.position, 1e3)));
     let mut charts = vec![
-        chart(
-            format!("Contact force along {axis}"),
-            "N",
-            force,
-            limits(report),
-            true,
-        ),
-        chart(
-            format!("Tool position along {axis}"),
-            "mm",
-            position,
-            Vec::new(),
-            false,
-        ),
-        chart(
-            format!("Target error Xᵗ − X along {axis}"),
-            "mm",
-            error,
-            Vec::new(),
-            false,
-        ),
+        chart(format!("Contact force along {axis}"), "N", force, limits(report), true),
+        chart(format!("Tool position along {axis}"), "mm", position, Vec::new(), false),
+        chart(format!("Target error Xᵗ − X along {axis}"), "mm", error, Vec::new(), false),
     ];
     for variant in &report.variants {
-        let lines = (0..JOINTS)
-            .map(|i| {
-                line(
-                    &format!("joint {}", i + 1),
-                    i,
-                    &variant.curves.torque[i],
-                    1.0,
-                )
-            })
-            .collect();
-        let limit = |min, max| Span {
-            allowed: false,
-            from: 0.0,
-            until: end,
-            min,
-            max,
-        };
+        let lines = (0..JOINTS).map(|i| line(&format!("joint {}", i + 1), i, &variant.curves.torque[i], 1.0)).collect();
+        let limit = |min, max| Span { allowed: false, from: 0.0, until: end, min, max };
         let boxes = vec![limit(100.0, 1000.0), limit(-1000.0, -100.0)];
-        charts.push(chart(
-            format!("Joint torques: {}", variant.name),
-            "% of limit",
-            lines,
-            boxes,
-            false,
-        ));
+        charts.push(chart(format!("Joint torques: {}", variant.name), "% of limit", lines, boxes, false));
     }
     charts
 }
@@ -214,10 +146,7 @@ fn sample(of: &Series, grid: &[f64], scale: f64) -> Vec<Option<f64>> {
             let distance = |y: f64| last.map_or(0.0, |last| (y - last).abs());
             let value = match inside.len() {
                 0 | 1 => of.at(t)?,
-                _ => of.y[inside]
-                    .iter()
-                    .copied()
-                    .reduce(|a, b| if distance(b) > distance(a) { b } else { a })?,
+                _ => of.y[inside].iter().copied().reduce(|a, b| if distance(b) > distance(a) { b } else { a })?,
             };
             last = Some(value);
             Some(round(value * scale, 3))
@@ -226,17 +155,8 @@ fn sample(of: &Series, grid: &[f64], scale: f64) -> Vec<Option<f64>> {
 }
 
 fn commanded(report: &RunReport, grid: &[f64]) -> Vec<Option<f64>> {
-    let rows = report
-        .variants
-        .first()
-        .map_or(&[][..], |variant| &variant.segments);
-    grid.iter()
-        .map(|t| {
-            rows.iter()
-                .find(|row| row.start_s <= *t && *t < row.end_s)?
-                .commanded_n
-        })
-        .collect()
+    let rows = report.variants.first().map_or(&[][..], |variant| &variant.segments);
+    grid.iter().map(|t| rows.iter().find(|row| row.start_s <= *t && *t < row.end_s)?.commanded_n).collect()
 }
 
 /// Limits on forces, as areas of the force picture.
@@ -244,10 +164,7 @@ fn limits(report: &RunReport) -> Vec<Span> {
     let mut boxes: Vec<Span> = Vec::new();
     for variant in &report.variants {
         for check in &variant.checks {
-            let row = variant
-                .segments
-                .iter()
-                .find(|row| Some(&row.name) == check.segment.as_ref());
+            let row = variant.segments.iter().find(|row| Some(&row.name) == check.segment.as_ref());
             let span = match (check.measure, row, check.min, check.max) {
                 (Measure::ForceMeanErrorN, Some(row), _, Some(max)) => {
                     let wanted = row.commanded_n.unwrap_or(0.0);
@@ -261,18 +178,9 @@ fn limits(report: &RunReport) -> Vec<Span> {
                 }
                 (Measure::FirstPeakN, _, Some(min), Some(max)) => {
                     let from = variant.run.first_contact_s.unwrap_or(0.0);
-                    let row = variant
-                        .segments
-                        .iter()
-                        .find(|row| row.start_s <= from && from < row.end_s);
+                    let row = variant.segments.iter().find(|row| row.start_s <= from && from < row.end_s);
                     let from = row.map_or(0.0, |row| row.start_s);
-                    Span {
-                        allowed: true,
-                        from,
-                        until: from + 1.0,
-                        min,
-                        max,
-                    }
+                    Span { allowed: true, from, until: from + 1.0, min, max }
                 }
                 _ => continue,
             };
@@ -306,17 +214,8 @@ mod tests {
 
     #[test]
     fn a_line_ends_where_its_run_ended() {
-        let series = Series {
-            t: vec![0.0, 1.0, 2.0, 3.0],
-            y: vec![1.0; 4],
-        };
+        let series = Series { t: vec![0.0, 1.0, 2.0, 3.0], y: vec![1.0; 4] };
         let grid: Vec<f64> = (0..=6).map(f64::from).collect();
-        assert_eq!(
-            sample(&series, &grid, 1.0)
-                .iter()
-                .filter(|y| y.is_some())
-                .count(),
-            5
-        );
+        assert_eq!(sample(&series, &grid, 1.0).iter().filter(|y| y.is_some()).count(), 5);
     }
 }

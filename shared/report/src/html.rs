@@ -2,15 +2,13 @@
 
 use crate::accounting::WaterfallAccount;
 use crate::bus_rows::{
-    AGE_HEADINGS, MASTER_HEADINGS, TASK_HEADINGS, WATERFALL_HEADINGS, counts, masters, part_name, tasks,
-    waterfall,
+    AGE_HEADINGS, MASTER_HEADINGS, TASK_HEADINGS, WATERFALL_HEADINGS, counts, masters, part_name, tasks, waterfall,
 };
 use crate::chart::charts;
 use crate::result::RunReport;
 use crate::svg;
 use crate::text::{
-    CHECK_HEADINGS, HEADINGS, LATENCY_HEADINGS, check_row, latency_rows, segments, sweep_table,
-    verdict,
+    CHECK_HEADINGS, HEADINGS, LATENCY_HEADINGS, check_row, latency_rows, segments, sweep_table, verdict,
 };
 use crate::trace::Ended;
 use crate::verdict::Verdict;
@@ -73,24 +71,10 @@ fn facts(report: &RunReport) -> String {
         format!("seed <b>{}</b>", report.seed),
         format!("<b>{}</b>", escape(&report.pacing)),
     ];
-    let simulated: f64 = report
-        .variants
-        .iter()
-        .map(|variant| variant.simulated_s)
-        .sum();
-    facts.push(format!(
-        "<b>{simulated:.1} s</b> simulated in {} runs",
-        report.variants.len()
-    ));
-    let walls: Option<Vec<f64>> = report
-        .variants
-        .iter()
-        .map(|variant| variant.wall_s)
-        .collect();
-    if let Some(wall) = walls
-        .map(|walls| walls.iter().sum::<f64>())
-        .filter(|wall| *wall > 0.0)
-    {
+    let simulated: f64 = report.variants.iter().map(|variant| variant.simulated_s).sum();
+    facts.push(format!("<b>{simulated:.1} s</b> simulated in {} runs", report.variants.len()));
+    let walls: Option<Vec<f64>> = report.variants.iter().map(|variant| variant.wall_s).collect();
+    if let Some(wall) = walls.map(|walls| walls.iter().sum::<f64>()).filter(|wall| *wall > 0.0) {
         facts.push(format!("<b>{:.0} ×</b> real time", simulated / wall));
     }
     facts.push(format!("vmerack {}", report.vmerack));
@@ -102,29 +86,20 @@ fn cards(report: &RunReport) -> String {
     let mut out = String::new();
     for (i, variant) in report.variants.iter().enumerate() {
         let judged = variant.checks.iter().filter(|check| check.passed.is_some());
-        let held = judged
-            .clone()
-            .filter(|check| check.passed == Some(true))
-            .count();
+        let held = judged.clone().filter(|check| check.passed == Some(true)).count();
         let means: Vec<String> = variant
             .segments
             .iter()
             .filter(|row| row.force_controlled)
-            .map(|row| {
-                row.mean_n
-                    .map_or_else(|| "–".into(), |mean| format!("{:.1}", mean + 0.0))
-            })
+            .map(|row| row.mean_n.map_or_else(|| "–".into(), |mean| format!("{:.1}", mean + 0.0)))
             .collect();
         let ended = match &variant.ended {
             Ended::Completed => format!("{held} of {} limits hold", judged.count()),
             Ended::Diverged { at_s } => format!("diverged at {at_s:.2} s"),
             Ended::Stopped { at_s, .. } => format!("stopped at {at_s:.2} s"),
         };
-        let findings: String = variant
-            .findings
-            .iter()
-            .map(|finding| format!("<p class=finding>{}</p>", escape(finding)))
-            .collect();
+        let findings: String =
+            variant.findings.iter().map(|finding| format!("<p class=finding>{}</p>", escape(finding))).collect();
         out += &format!(
             "<article class=card><h3><i class=swatch data-color={i}></i>{}<span class=\"pill {}\">{}</span></h3>\
              <p class=big>{}<small>N</small></p><p class=note>mean force of each force segment's last second</p>\
@@ -142,12 +117,7 @@ fn checks(report: &RunReport) -> String {
     let rows: Vec<_> = report
         .variants
         .iter()
-        .flat_map(|variant| {
-            variant
-                .checks
-                .iter()
-                .map(|check| check_row(&variant.name, check))
-        })
+        .flat_map(|variant| variant.checks.iter().map(|check| check_row(&variant.name, check)))
         .collect();
     if rows.is_empty() {
         return "<p class=note>The scenario sets no limits.</p>".into();
@@ -157,22 +127,11 @@ fn checks(report: &RunReport) -> String {
 
 fn segment_tables(report: &RunReport) -> String {
     let mut out = String::new();
-    if let Some(variant) = report
-        .variants
-        .iter()
-        .find(|variant| !variant.ideal.is_empty())
-    {
-        out += &format!(
-            "<h3>ideal impedance, one axis</h3>{}",
-            table(&HEADINGS, &segments(&variant.ideal))
-        );
+    if let Some(variant) = report.variants.iter().find(|variant| !variant.ideal.is_empty()) {
+        out += &format!("<h3>ideal impedance, one axis</h3>{}", table(&HEADINGS, &segments(&variant.ideal)));
     }
     for variant in &report.variants {
-        out += &format!(
-            "<h3>{}</h3>{}",
-            escape(&variant.name),
-            table(&HEADINGS, &segments(&variant.segments))
-        );
+        out += &format!("<h3>{}</h3>{}", escape(&variant.name), table(&HEADINGS, &segments(&variant.segments)));
         if let Some(digest) = &variant.digest {
             out += &format!("<p class=note>digest <code>{}</code></p>", escape(digest));
         }
@@ -254,10 +213,7 @@ fn waterfall_bar(account: &WaterfallAccount) -> String {
 }
 
 fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
-    let head: String = headings
-        .iter()
-        .map(|heading| format!("<th>{}</th>", escape(heading)))
-        .collect();
+    let head: String = headings.iter().map(|heading| format!("<th>{}</th>", escape(heading))).collect();
     let body: String = rows
         .iter()
         .map(|row| {
@@ -276,9 +232,7 @@ fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
             format!("<tr>{cells}</tr>")
         })
         .collect();
-    format!(
-        "<div class=scroll><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
-    )
+    format!("<div class=scroll><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>")
 }
 
 fn class(verdict: Verdict) -> &'static str {
@@ -296,10 +250,7 @@ fn paragraphs(text: &str) -> String {
 }
 
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -309,9 +260,6 @@ mod tests {
     #[test]
     fn text_from_a_scenario_cannot_become_markup() {
         assert_eq!(escape("<b>&\"</b>"), "&lt;b&gt;&amp;&quot;&lt;/b&gt;");
-        assert_eq!(
-            fill("{{a}}-{{b}}", &[("a", "{{b}}".into()), ("b", "x".into())]),
-            "{{b}}-x"
-        );
+        assert_eq!(fill("{{a}}-{{b}}", &[("a", "{{b}}".into()), ("b", "x".into())]), "{{b}}-x");
     }
 }

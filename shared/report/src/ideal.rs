@@ -51,9 +51,7 @@ fn wall(scenario: &Scenario, axis: usize) -> Option<Wall> {
         let cosine = -normal[axis];
         // a surface seen from the side is none for this axis
         (cosine > 0.1).then(|| {
-            let to_plane: f64 = (0..3)
-                .map(|i| normal[i] * (surface.position_m[i] - start[i]))
-                .sum();
+            let to_plane: f64 = (0..3).map(|i| normal[i] * (surface.position_m[i] - start[i])).sum();
             Wall {
                 position: start[axis] - to_plane / cosine,
                 cosine,
@@ -66,23 +64,13 @@ fn wall(scenario: &Scenario, axis: usize) -> Option<Wall> {
 }
 
 /// The response over `segments` up to `until` s. `desired` is X_d along the axis, as it was commanded.
-pub fn ideal(
-    scenario: &Scenario,
-    segments: &[ResolvedSegment],
-    axis: usize,
-    desired: &Series,
-    until: f64,
-) -> Ideal {
+pub fn ideal(scenario: &Scenario, segments: &[ResolvedSegment], axis: usize, desired: &Series, until: f64) -> Ideal {
     let wall = wall(scenario, axis);
     let mut response = Ideal::default();
     let mut x = scenario.arm.start_position_m[axis];
     let mut v = 0.0;
     for segment in segments.iter().filter(|segment| segment.start_s < until) {
-        let (mass, damping, stiffness) = (
-            segment.mass[axis],
-            segment.damping[axis],
-            segment.stiffness[axis],
-        );
+        let (mass, damping, stiffness) = (segment.mass[axis], segment.damping[axis], segment.stiffness[axis]);
         let impedance = segment.selection[axis] != 0;
         // X_d stands still, or moves as recorded; on a force axis it does not count
         let moving = impedance && matches!(segment.path, Path::PointToPoint | Path::Line);
@@ -91,11 +79,7 @@ pub fn ideal(
             () if moving => desired.at(t).unwrap_or(segment.position_m[axis]),
             () => segment.position_m[axis],
         };
-        let (spring, push) = if impedance {
-            (stiffness, 0.0)
-        } else {
-            (0.0, segment.force[axis])
-        };
+        let (spring, push) = if impedance { (stiffness, 0.0) } else { (0.0, segment.force[axis]) };
         // y = x − S x_d: its equation needs no derivative of x_d
         let acceleration = |t: f64, y: f64, u: f64| {
             let contact = wall.map_or(0.0, |wall| wall.force(y + desired_at(t), u));
@@ -105,35 +89,23 @@ pub fn ideal(
         let samples = ((end - segment.start_s) / SAMPLE_S).round().max(1.0) as usize;
         let between = (end - segment.start_s) / samples as f64;
         let total_stiffness = spring + wall.map_or(0.0, |wall| wall.stiffness);
-        let fastest = (mass / total_stiffness.max(1e-9))
-            .sqrt()
-            .min(mass / damping.max(1e-9));
-        let steps = (between / STEP_S.min(0.05 * fastest))
-            .ceil()
-            .clamp(1.0, 10_000.0) as usize;
+        let fastest = (mass / total_stiffness.max(1e-9)).sqrt().min(mass / damping.max(1e-9));
+        let steps = (between / STEP_S.min(0.05 * fastest)).ceil().clamp(1.0, 10_000.0) as usize;
         let h = between / steps as f64;
         let mut y = x - desired_at(segment.start_s);
         for sample in 0..=samples {
             let t0 = segment.start_s + sample as f64 * between;
             x = y + desired_at(t0);
             response.position.push(t0, x);
-            response
-                .force
-                .push(t0, wall.map_or(0.0, |wall| wall.force(x, v)));
+            response.force.push(t0, wall.map_or(0.0, |wall| wall.force(x, v)));
             if sample == samples {
                 break;
             }
             for step in 0..steps {
                 let t = t0 + step as f64 * h;
                 let (k1y, k1v) = (v, acceleration(t, y, v));
-                let (k2y, k2v) = (
-                    v + 0.5 * h * k1v,
-                    acceleration(t + 0.5 * h, y + 0.5 * h * k1y, v + 0.5 * h * k1v),
-                );
-                let (k3y, k3v) = (
-                    v + 0.5 * h * k2v,
-                    acceleration(t + 0.5 * h, y + 0.5 * h * k2y, v + 0.5 * h * k2v),
-                );
+                let (k2y, k2v) = (v + 0.5 * h * k1v, acceleration(t + 0.5 * h, y + 0.5 * h * k1y, v + 0.5 * h * k1v));
+                let (k3y, k3v) = (v + 0.5 * h * k2v, acceleration(t + 0.5 * h, y + 0.5 * h * k2y, v + 0.5 * h * k2v));
                 let (k4y, k4v) = (v + h * k3v, acceleration(t + h, y + h * k3y, v + h * k3v));
                 y += h / 6.0 * (k1y + 2.0 * k2y + 2.0 * k3y + k4y);
                 v += h / 6.0 * (k1v + 2.0 * k2v + 2.0 * k3v + k4v);
@@ -151,20 +123,11 @@ mod tests {
     use super::*;
 
     fn table_5_3() -> Scenario {
-        scenario::load("table-5-3", &[])
-            .unwrap()
-            .scenario()
-            .unwrap()
+        scenario::load("table-5-3", &[]).unwrap().scenario().unwrap()
     }
 
     fn response(scenario: &Scenario) -> Ideal {
-        ideal(
-            scenario,
-            &scenario.resolved_segments(),
-            2,
-            &Series::default(),
-            scenario.duration(),
-        )
+        ideal(scenario, &scenario.resolved_segments(), 2, &Series::default(), scenario.duration())
     }
 
     /// Figures of Table 5-3 that were found by an independent computation: first peak at a gap of 5 mm, peak after the
@@ -173,16 +136,8 @@ mod tests {
     fn the_peaks_of_table_5_3_are_74_8_and_83_3_n_and_the_dip_33_5_n() {
         let force = response(&table_5_3()).force;
         let greatest = |from, until| force.greatest(from, until, |_, y| Some(y)).unwrap();
-        assert!(
-            (greatest(1.0, 4.0) - 74.8).abs() < 0.1,
-            "{}",
-            greatest(1.0, 4.0)
-        );
-        assert!(
-            (greatest(4.0, 7.0) - 83.3).abs() < 0.1,
-            "{}",
-            greatest(4.0, 7.0)
-        );
+        assert!((greatest(1.0, 4.0) - 74.8).abs() < 0.1, "{}", greatest(1.0, 4.0));
+        assert!((greatest(4.0, 7.0) - 83.3).abs() < 0.1, "{}", greatest(4.0, 7.0));
         let dip = -force.greatest(7.0, 10.0, |_, y| Some(-y)).unwrap();
         assert!((dip - 33.5).abs() < 0.1, "{dip}");
         assert!((force.at(13.0).unwrap()).abs() < 0.1);
@@ -198,14 +153,10 @@ mod tests {
         for i in 0..200 {
             let t = 0.01 * f64::from(i);
             let decay = libm::exp(-zeta * omega * t);
-            let step = 1.0
-                - decay * (libm::cos(damped * t) + zeta * omega / damped * libm::sin(damped * t));
+            let step = 1.0 - decay * (libm::cos(damped * t) + zeta * omega / damped * libm::sin(damped * t));
             let expected = 60.0 + 20.0 * step;
             let actual = force.at(4.0 + t).unwrap();
-            assert!(
-                (actual - expected).abs() < 2e-3,
-                "{t} s: {actual} N, expected {expected} N"
-            );
+            assert!((actual - expected).abs() < 2e-3, "{t} s: {actual} N, expected {expected} N");
         }
     }
 
@@ -235,10 +186,7 @@ mod tests {
         scenario.surfaces.clear();
         scenario.segments.truncate(1);
         scenario.segments[0].path = Path::PointToPoint;
-        let ramp = Series {
-            t: vec![0.0, 1.0],
-            y: vec![0.0, 0.02],
-        };
+        let ramp = Series { t: vec![0.0, 1.0], y: vec![0.0, 0.02] };
         let segments = scenario.resolved_segments();
         let position = ideal(&scenario, &segments, 2, &ramp, 1.0).position;
         assert!((position.at(0.5).unwrap() - 0.01).abs() < 1e-12);

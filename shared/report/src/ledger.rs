@@ -37,27 +37,16 @@ pub struct PathLatency {
 impl Ledger {
     /// An empty ledger over the scenario's cards.
     pub fn new(scenario: &Scenario) -> Ledger {
-        let mut cards: Vec<_> = scenario
-            .rack
-            .slaves
-            .iter()
-            .map(|slave| slave.name.clone())
-            .collect();
+        let mut cards: Vec<_> = scenario.rack.slaves.iter().map(|slave| slave.name.clone()).collect();
         cards.push("(no card)".into());
         let paths = vec![[None, None]; cards.len()];
-        Ledger {
-            cards,
-            paths,
-            errors: 0,
-        }
+        Ledger { cards, paths, errors: 0 }
     }
 
     /// Counts one transfer.
     pub fn push(&mut self, transfer: &Transfer) {
         let none = self.cards.len() - 1;
-        let card = transfer
-            .slave
-            .map_or(none, |slave| usize::from(slave).min(none));
+        let card = transfer.slave.map_or(none, |slave| usize::from(slave).min(none));
         let direction = usize::from(transfer.access.dir != Direction::Read);
         let histogram = self.paths[card][direction].get_or_insert_with(histogram);
         histogram.saturating_record(transfer.done.saturating_sub(transfer.requested).max(1));

@@ -8,6 +8,7 @@
 mod accounting;
 mod bus_rows;
 mod chart;
+mod envelope;
 mod html;
 mod ideal;
 mod ledger;
@@ -20,9 +21,7 @@ pub mod text;
 mod trace;
 mod verdict;
 
-pub use accounting::{
-    Accounting, BusAccount, MasterAccount, PartAccount, Spread, TaskAccount, WaterfallAccount,
-};
+pub use accounting::{Accounting, BusAccount, MasterAccount, PartAccount, Spread, TaskAccount, WaterfallAccount};
 pub use ledger::{Ledger, PathLatency};
 pub use measures::RunMeasures;
 pub use result::{RunReport, SCHEMA_VERSION, Sweep, SweepPoint, VariantResult, WriteError};

@@ -1,5 +1,6 @@
 //! Measures of a whole run.
 
+use crate::envelope::Envelope;
 use crate::segments::SegmentRow;
 use crate::series::Series;
 use crate::trace::Trace;
@@ -20,6 +21,10 @@ pub struct RunMeasures {
     pub incapable_segments: Option<f64>,
     /// Pairs of force segments whose mean forces are not in the order of their F_d.
     pub force_order_violations: Option<f64>,
+    /// Growth of the oscillation of X in the last segment, per period.
+    pub envelope_growth: Option<f64>,
+    /// Periods over which that was taken.
+    pub envelope_periods: Option<f64>,
     /// Greatest joint torque sent, as a share of its limit.
     pub torque_share: Option<f64>,
     /// Greatest joint speed in the last second, rad/s.
@@ -58,22 +63,26 @@ impl RunMeasures {
         trace: &Trace,
         rows: &[SegmentRow],
         force: &Series,
+        position: &Series,
         ideal_force: Option<&Series>,
         bounds: &Bounds,
         until: f64,
     ) -> RunMeasures {
         let contact = first_contact(trace);
+        let last = rows.iter().rfind(|row| row.start_s < until);
+        let envelope = last.and_then(|row| Envelope::of(position, row.start_s, row.end_s.min(until)));
         RunMeasures {
             first_contact_s: contact,
             first_peak_n: contact.and_then(|contact| first_peak(force, rows, contact, until)),
-            ideal_force_deviation_n: ideal_force.and_then(|ideal| {
-                force.greatest(0.0, until, |t, y| Some((y - ideal.at(t)?).abs()))
-            }),
+            ideal_force_deviation_n: ideal_force
+                .and_then(|ideal| force.greatest(0.0, until, |t, y| Some((y - ideal.at(t)?).abs()))),
             incapable_segments: incapable(rows),
             force_order_violations: order_violations(rows),
-            torque_share: greatest(trace.control.iter().flat_map(|probe| {
-                (0..JOINTS).map(|i| probe.torque[i].abs() / bounds.torque_nm[i])
-            })),
+            envelope_growth: envelope.map(|envelope| envelope.growth),
+            envelope_periods: envelope.map(|envelope| envelope.periods),
+            torque_share: greatest(
+                trace.control.iter().flat_map(|probe| (0..JOINTS).map(|i| probe.torque[i].abs() / bounds.torque_nm[i])),
+            ),
             self_motion_rad_per_s: greatest(
                 trace
                     .plant
@@ -82,9 +91,7 @@ impl RunMeasures {
                     .flat_map(|probe| probe.qd.into_iter().map(f64::abs)),
             ),
             joint_limit_distance_rad: greatest(trace.plant.iter().flat_map(|probe| {
-                (0..JOINTS).map(|i| {
-                    -(probe.q[i] - bounds.lower_rad[i]).min(bounds.upper_rad[i] - probe.q[i])
-                })
+                (0..JOINTS).map(|i| -(probe.q[i] - bounds.lower_rad[i]).min(bounds.upper_rad[i] - probe.q[i]))
             }))
             .map(|least| -least),
             bus_load: trace.bus.as_ref().map(|bus| bus.utilisation),
@@ -116,6 +123,7 @@ impl RunMeasures {
             IdealForceDeviationN => self.ideal_force_deviation_n,
             IncapableSegments => self.incapable_segments,
             ForceOrderViolations => self.force_order_violations,
+            EnvelopeGrowth => self.envelope_growth,
             TorqueShare => self.torque_share,
             SelfMotionRadPerS => self.self_motion_rad_per_s,
             JointLimitDistanceRad => self.joint_limit_distance_rad,
@@ -129,11 +137,7 @@ impl RunMeasures {
 /// Instant of the first contact force, s.
 pub(crate) fn first_contact(trace: &Trace) -> Option<f64> {
     let touches = |contact: &[f64; 6]| contact[..3].iter().any(|force| force.abs() > 1e-9);
-    trace
-        .plant
-        .iter()
-        .find(|probe| touches(&probe.contact))
-        .map(|probe| crate::trace::seconds(probe.t))
+    trace.plant.iter().find(|probe| touches(&probe.contact)).map(|probe| crate::trace::seconds(probe.t))
 }
 
 /// Greatest of finite numbers.
@@ -144,9 +148,7 @@ fn greatest(values: impl Iterator<Item = f64>) -> Option<f64> {
 /// The running maximum at the moment at which the force has first fallen 5 % of F_d below it, or at the
 /// end of the segment in which the contact began.
 fn first_peak(force: &Series, rows: &[SegmentRow], contact: f64, until: f64) -> Option<f64> {
-    let row = rows
-        .iter()
-        .find(|row| row.start_s <= contact && contact < row.end_s)?;
+    let row = rows.iter().find(|row| row.start_s <= contact && contact < row.end_s)?;
     let end = row.end_s.min(until);
     let fall = 0.05 * row.commanded_n.unwrap_or(0.0).abs();
     let mut peak: Option<f64> = None;
@@ -160,30 +162,20 @@ fn first_peak(force: &Series, rows: &[SegmentRow], contact: f64, until: f64) -> 
 }
 
 fn incapable(rows: &[SegmentRow]) -> Option<f64> {
-    let pairs: Vec<_> = rows
-        .iter()
-        .filter_map(|row| Some((row.commanded_n?, row.mean_error_n?)))
-        .collect();
+    let pairs: Vec<_> = rows.iter().filter_map(|row| Some((row.commanded_n?, row.mean_error_n?))).collect();
     let judged = pairs.iter().filter(|(wanted, _)| *wanted > 0.0);
-    let off = judged
-        .clone()
-        .filter(|(wanted, error)| *error > 0.5 * wanted)
-        .count();
+    let off = judged.clone().filter(|(wanted, error)| *error > 0.5 * wanted).count();
     (judged.count() > 0).then_some(off as f64)
 }
 
 fn order_violations(rows: &[SegmentRow]) -> Option<f64> {
-    let pairs: Vec<_> = rows
-        .iter()
-        .filter_map(|row| Some((row.commanded_n?, row.mean_n?)))
-        .collect();
+    let pairs: Vec<_> = rows.iter().filter_map(|row| Some((row.commanded_n?, row.mean_n?))).collect();
     let mut violations = 0;
     for (i, (wanted, mean)) in pairs.iter().enumerate() {
         violations += pairs[i + 1..]
             .iter()
             .filter(|(other_wanted, other_mean)| {
-                wanted != other_wanted
-                    && ((wanted < other_wanted) != (mean < other_mean) || mean == other_mean)
+                wanted != other_wanted && ((wanted < other_wanted) != (mean < other_mean) || mean == other_mean)
             })
             .count();
     }
@@ -225,12 +217,8 @@ mod tests {
 
     #[test]
     fn forces_in_the_order_of_their_commands_violate_nothing() {
-        let rows = [(60.0, 62.5), (80.0, 81.3), (40.0, 40.0), (0.0, 0.1)]
-            .map(|(wanted, mean)| row(wanted, Some(mean)));
-        assert_eq!(
-            (incapable(&rows), order_violations(&rows)),
-            (Some(0.0), Some(0.0))
-        );
+        let rows = [(60.0, 62.5), (80.0, 81.3), (40.0, 40.0), (0.0, 0.1)].map(|(wanted, mean)| row(wanted, Some(mean)));
+        assert_eq!((incapable(&rows), order_violations(&rows)), (Some(0.0), Some(0.0)));
         let rows = [(60.0, 85.0), (80.0, 81.3)].map(|(wanted, mean)| row(wanted, Some(mean)));
         assert_eq!(order_violations(&rows), Some(1.0));
         assert_eq!(order_violations(&[row(60.0, None), row(80.0, None)]), None);
@@ -238,10 +226,7 @@ mod tests {
 
     #[test]
     fn the_first_peak_ends_where_the_force_has_clearly_fallen() {
-        let force = Series {
-            t: vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0],
-            y: vec![0.0, 50.0, 49.0, 70.0, 60.0, 90.0],
-        };
+        let force = Series { t: vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0], y: vec![0.0, 50.0, 49.0, 70.0, 60.0, 90.0] };
         assert_eq!(first_peak(&force, &[row(60.0, None)], 0.0, 9.0), Some(70.0));
     }
 }

@@ -69,12 +69,10 @@ impl VariantResult {
     ) -> Result<VariantResult, String> {
         let axis = scenario.report.force_axis;
         let segments = scenario.resolved_segments();
-        let plant = |f: &dyn Fn(&messages::PlantProbe) -> f64| {
-            series(trace.plant.iter().map(|probe| (probe.t, f(probe))))
-        };
-        let control = |f: &dyn Fn(&messages::ControlProbe) -> f64| {
-            series(trace.control.iter().map(|probe| (probe.t, f(probe))))
-        };
+        let plant =
+            |f: &dyn Fn(&messages::PlantProbe) -> f64| series(trace.plant.iter().map(|probe| (probe.t, f(probe))));
+        let control =
+            |f: &dyn Fn(&messages::ControlProbe) -> f64| series(trace.control.iter().map(|probe| (probe.t, f(probe))));
         let force = plant(&|probe| probe.contact[axis]);
         let position = plant(&|probe| probe.position[axis]);
         let encoder_position = control(&|probe| probe.x[axis]);
@@ -84,10 +82,7 @@ impl VariantResult {
             Ended::Completed => reached_s,
             Ended::Diverged { at_s } | Ended::Stopped { at_s, .. } => at_s.min(reached_s),
         };
-        let ideal = scenario
-            .report
-            .ideal
-            .then(|| ideal(scenario, &segments, axis, &desired, until));
+        let ideal = scenario.report.ideal.then(|| ideal(scenario, &segments, axis, &desired, until));
         let contact = first_contact(trace);
         let segment_rows = rows(
             &segments,
@@ -103,14 +98,14 @@ impl VariantResult {
                 until,
             },
         );
-        let ideal_rows = ideal.as_ref().map_or_else(Vec::new, |ideal| {
-            ideal_rows(&segments, axis, ideal, &desired, until)
-        });
+        let ideal_rows =
+            ideal.as_ref().map_or_else(Vec::new, |ideal| ideal_rows(&segments, axis, ideal, &desired, until));
         let bounds = Bounds::of(scenario)?;
         let run = RunMeasures::of(
             trace,
             &segment_rows,
             &force,
+            &position,
             ideal.as_ref().map(|ideal| &ideal.force),
             &bounds,
             until,
@@ -122,60 +117,34 @@ impl VariantResult {
             Ended::Completed => {}
             Ended::Diverged { at_s } => {
                 bad |= !variant.may_diverge;
-                findings.push(format!(
-                    "diverged at {at_s:.3} s{}",
-                    expected(variant.may_diverge)
-                ));
+                findings.push(format!("diverged at {at_s:.3} s{}", expected(variant.may_diverge)));
             }
             Ended::Stopped { at_s, reason } => {
                 bad = true;
                 findings.push(format!("stopped at {at_s:.3} s: {reason}"));
             }
         }
-        let pushes = segment_rows
-            .iter()
-            .any(|row| row.reached && row.commanded_n.is_some_and(|wanted| wanted > 0.0));
+        let pushes = segment_rows.iter().any(|row| row.reached && row.commanded_n.is_some_and(|wanted| wanted > 0.0));
         if pushes && contact.is_none() && !scenario.surfaces.is_empty() {
             bad |= !variant.may_miss_surface;
-            findings.push(format!(
-                "never touched the surface{}",
-                expected(variant.may_miss_surface)
-            ));
+            findings.push(format!("never touched the surface{}", expected(variant.may_miss_surface)));
         }
-        let acted = |bit: u32| {
-            trace
-                .control
-                .iter()
-                .filter(|probe| probe.limits & bit != 0)
-                .count()
-        };
+        let acted = |bit: u32| trace.control.iter().filter(|probe| probe.limits & bit != 0).count();
         for (bit, what) in [
-            (
-                messages::limits::TARGET_ERROR,
-                "the limit on |Xᵗ − X| acted",
-            ),
+            (messages::limits::TARGET_ERROR, "the limit on |Xᵗ − X| acted"),
             (messages::limits::TORQUE, "a joint torque was saturated"),
         ] {
             if acted(bit) > 0 {
-                findings.push(format!(
-                    "{what} in {} of {} control jobs",
-                    acted(bit),
-                    trace.control.len()
-                ));
+                findings.push(format!("{what} in {} of {} control jobs", acted(bit), trace.control.len()));
             }
         }
         if ledger.errors() > 0 {
-            findings.push(format!(
-                "{} bus transfers ended in BERR* or time-out",
-                ledger.errors()
-            ));
+            findings.push(format!("{} bus transfers ended in BERR* or time-out", ledger.errors()));
         }
         for task in trace.bus.iter().flat_map(|bus| &bus.tasks) {
             if task.lost_releases > 0 {
-                findings.push(format!(
-                    "task {} lost {} releases: the job before still ran",
-                    task.name, task.lost_releases
-                ));
+                findings
+                    .push(format!("task {} lost {} releases: the job before still ran", task.name, task.lost_releases));
             }
         }
         let tripped = |event: &&messages::Event| event.kind == EventKind::OverrunTrip as u32;
@@ -187,16 +156,10 @@ impl VariantResult {
                 seconds(event.t)
             ));
         }
-        let torque = std::array::from_fn(|i| {
-            control(&|probe| 100.0 * probe.torque[i] / bounds.torque_nm[i])
-        });
+        let torque = std::array::from_fn(|i| control(&|probe| 100.0 * probe.torque[i] / bounds.torque_nm[i]));
         Ok(VariantResult {
             name: variant.name.clone(),
-            verdict: if bad {
-                Verdict::Failed
-            } else {
-                Verdict::Passed
-            },
+            verdict: if bad { Verdict::Failed } else { Verdict::Passed },
             ended,
             findings,
             simulated_s: until,
@@ -211,23 +174,13 @@ impl VariantResult {
             measured: Vec::new(),
             record: None,
             digest: None,
-            curves: Curves {
-                force,
-                position,
-                target,
-                torque,
-                ideal: ideal.unwrap_or_default(),
-            },
+            curves: Curves { force, position, target, torque, ideal: ideal.unwrap_or_default() },
         })
     }
 }
 
 fn expected(is: bool) -> &'static str {
-    if is {
-        " (expected of this variant)"
-    } else {
-        ""
-    }
+    if is { " (expected of this variant)" } else { "" }
 }
 
 fn series(samples: impl Iterator<Item = (vme::Ns, f64)>) -> Series {
@@ -245,13 +198,7 @@ fn ideal_rows(
     desired: &Series,
     until: f64,
 ) -> Vec<SegmentRow> {
-    let contact = ideal
-        .force
-        .t
-        .iter()
-        .zip(&ideal.force.y)
-        .find(|(_, force)| **force > 0.0)
-        .map(|(t, _)| *t);
+    let contact = ideal.force.t.iter().zip(&ideal.force.y).find(|(_, force)| **force > 0.0).map(|(t, _)| *t);
     let signals = Signals {
         force: &ideal.force,
         position: &ideal.position,
@@ -356,15 +303,8 @@ impl RunReport {
             description: scenario.description.clone(),
             seed: scenario.seed,
             pacing: pacing.to_owned(),
-            axis: ["x", "y", "z"]
-                .get(scenario.report.force_axis)
-                .copied()
-                .unwrap_or("?"),
-            verdict: variants
-                .iter()
-                .map(|variant| variant.verdict)
-                .max()
-                .unwrap_or(Verdict::Failed),
+            axis: ["x", "y", "z"].get(scenario.report.force_axis).copied().unwrap_or("?"),
+            verdict: variants.iter().map(|variant| variant.verdict).max().unwrap_or(Verdict::Failed),
             variants,
             sweeps,
         }
@@ -380,15 +320,10 @@ impl RunReport {
         let write = |name: &str, content: Result<String, String>| {
             let path = folder.join(name);
             content
-                .and_then(|content| {
-                    std::fs::write(&path, content).map_err(|error| error.to_string())
-                })
+                .and_then(|content| std::fs::write(&path, content).map_err(|error| error.to_string()))
                 .map_err(|reason| WriteError { path, reason })
         };
-        write(
-            "report.json",
-            self.json().map_err(|error| error.to_string()),
-        )?;
+        write("report.json", self.json().map_err(|error| error.to_string()))?;
         write("report.html", crate::html::render(self))
     }
 }

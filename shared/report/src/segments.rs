@@ -66,15 +66,8 @@ pub(crate) struct Signals<'a> {
 }
 
 /// One row per segment.
-pub(crate) fn rows(
-    segments: &[ResolvedSegment],
-    axis: usize,
-    signals: &Signals,
-) -> Vec<SegmentRow> {
-    segments
-        .iter()
-        .map(|segment| row(segment, axis, signals))
-        .collect()
+pub(crate) fn rows(segments: &[ResolvedSegment], axis: usize, signals: &Signals) -> Vec<SegmentRow> {
+    segments.iter().map(|segment| row(segment, axis, signals)).collect()
 }
 
 fn row(segment: &ResolvedSegment, axis: usize, signals: &Signals) -> SegmentRow {
@@ -87,19 +80,13 @@ fn row(segment: &ResolvedSegment, axis: usize, signals: &Signals) -> SegmentRow 
     let mean_n = force.mean_of(closing, end, |y| y).filter(|_| reached);
     let deviation = |of: Option<&Series>| {
         let (of, ideal) = (of?, signals.ideal_position?);
-        of.greatest(start, end, |t, y| Some((y - ideal.at(t)?).abs()))
-            .filter(|_| reached)
+        of.greatest(start, end, |t, y| Some((y - ideal.at(t)?).abs())).filter(|_| reached)
     };
     let rms_error = |from: f64| {
-        force
-            .mean_of(from, end, |y| (y - wanted) * (y - wanted))
-            .filter(|_| reached && force_controlled)
-            .map(f64::sqrt)
+        force.mean_of(from, end, |y| (y - wanted) * (y - wanted)).filter(|_| reached && force_controlled).map(f64::sqrt)
     };
     let position_error = |of: &Series| {
-        (reached && !force_controlled)
-            .then(|| Some((of.at(end)? - signals.desired.at(end)?).abs()))
-            .flatten()
+        (reached && !force_controlled).then(|| Some((of.at(end)? - signals.desired.at(end)?).abs())).flatten()
     };
     SegmentRow {
         name: segment.name.clone(),
@@ -109,26 +96,12 @@ fn row(segment: &ResolvedSegment, axis: usize, signals: &Signals) -> SegmentRow 
         reached,
         commanded_n: force_controlled.then_some(wanted),
         mean_n,
-        mean_error_n: mean_n
-            .filter(|_| force_controlled)
-            .map(|mean| (mean - wanted).abs()),
+        mean_error_n: mean_n.filter(|_| force_controlled).map(|mean| (mean - wanted).abs()),
         rms_error_n: rms_error(closing),
         tracking_error_n: rms_error(start + OPENING_S),
-        least_n: force
-            .greatest(start, end, |_, y| Some(-y))
-            .filter(|_| reached)
-            .map(|least| -least),
-        peak_n: force
-            .greatest(start, end, |_, y| Some(y))
-            .filter(|_| reached),
-        rise_s: rise(
-            force,
-            start,
-            end.min(signals.until),
-            wanted,
-            signals.contact,
-        )
-        .filter(|_| force_controlled),
+        least_n: force.greatest(start, end, |_, y| Some(-y)).filter(|_| reached).map(|least| -least),
+        peak_n: force.greatest(start, end, |_, y| Some(y)).filter(|_| reached),
+        rise_s: rise(force, start, end.min(signals.until), wanted, signals.contact).filter(|_| force_controlled),
         position_error_m: position_error(signals.position),
         encoder_position_error_m: signals.encoder_position.and_then(position_error),
         ideal_position_deviation_m: deviation(Some(signals.position)),
@@ -142,11 +115,7 @@ fn rise(force: &Series, start: f64, end: f64, wanted: f64, contact: Option<f64>)
     if from >= end {
         return None;
     }
-    let initial = if contact > start {
-        0.0
-    } else {
-        force.at(start)?
-    };
+    let initial = if contact > start { 0.0 } else { force.at(start)? };
     if (wanted - initial).abs() < 1e-3 {
         return None;
     }
@@ -159,13 +128,9 @@ mod tests {
 
     #[test]
     fn rise_time_runs_from_the_first_contact_or_from_the_segments_start() {
-        let force = Series {
-            t: vec![0.0, 1.0, 2.0, 4.0, 5.0, 8.0],
-            y: vec![0.0, 0.0, 10.0, 10.0, 20.0, 20.0],
-        };
-        let close = |actual: Option<f64>, expected: f64| {
-            assert!((actual.unwrap() - expected).abs() < 1e-12, "{actual:?}")
-        };
+        let force = Series { t: vec![0.0, 1.0, 2.0, 4.0, 5.0, 8.0], y: vec![0.0, 0.0, 10.0, 10.0, 20.0, 20.0] };
+        let close =
+            |actual: Option<f64>, expected: f64| assert!((actual.unwrap() - expected).abs() < 1e-12, "{actual:?}");
         close(rise(&force, 0.5, 4.0, 10.0, Some(1.0)), 0.9);
         close(rise(&force, 4.0, 8.0, 20.0, Some(1.0)), 0.9);
         assert_eq!(rise(&force, 4.0, 8.0, 30.0, Some(1.0)), None);

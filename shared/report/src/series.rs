@@ -39,10 +39,7 @@ impl Series {
         let inner = self.t.partition_point(|&t| t <= from)..self.t.partition_point(|&t| t < until);
         let end = |t| self.at(t).map(|y| (t, y));
         let inner = inner.start..inner.end.max(inner.start);
-        end(from)
-            .into_iter()
-            .chain(inner.map(|i| (self.t[i], self.y[i])))
-            .chain(end(until))
+        end(from).into_iter().chain(inner.map(|i| (self.t[i], self.y[i]))).chain(end(until))
     }
 
     /// Mean of f(value) over time from `from` to `until`.
@@ -60,15 +57,8 @@ impl Series {
     }
 
     /// Greatest f(time, value) from `from` to `until`.
-    pub fn greatest(
-        &self,
-        from: f64,
-        until: f64,
-        f: impl Fn(f64, f64) -> Option<f64>,
-    ) -> Option<f64> {
-        self.within(from, until)
-            .filter_map(|(t, y)| f(t, y))
-            .reduce(f64::max)
+    pub fn greatest(&self, from: f64, until: f64, f: impl Fn(f64, f64) -> Option<f64>) -> Option<f64> {
+        self.within(from, until).filter_map(|(t, y)| f(t, y)).reduce(f64::max)
     }
 
     /// First instant from `from` to `until` at which the value passes `level`, coming from its other side.
@@ -91,10 +81,7 @@ mod tests {
     use super::*;
 
     fn ramp() -> Series {
-        Series {
-            t: vec![0.0, 1.0, 3.0],
-            y: vec![0.0, 1.0, 3.0],
-        }
+        Series { t: vec![0.0, 1.0, 3.0], y: vec![0.0, 1.0, 3.0] }
     }
 
     #[test]

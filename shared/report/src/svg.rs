@@ -19,45 +19,27 @@ const POINTS: usize = 650;
 /// One chart; the message says what the drawing library did not like.
 pub(crate) fn draw(chart: &Chart) -> Result<String, String> {
     let mut svg = String::new();
-    let area = SVGBackend::with_string(&mut svg, (900, if chart.tall { 420 } else { 280 }))
-        .into_drawing_area();
+    let area = SVGBackend::with_string(&mut svg, (900, if chart.tall { 420 } else { 280 })).into_drawing_area();
     plot(chart, &area).map_err(|error| error.to_string())?;
     drop(area);
     Ok(svg)
 }
 
-fn plot(
-    chart: &Chart,
-    area: &DrawingArea<SVGBackend, Shift>,
-) -> Result<(), Box<dyn std::error::Error>> {
+fn plot(chart: &Chart, area: &DrawingArea<SVGBackend, Shift>) -> Result<(), Box<dyn std::error::Error>> {
     area.fill(&WHITE)?;
-    let values = || {
-        chart
-            .lines
-            .iter()
-            .flat_map(|line| line.y.iter().flatten().copied())
-    };
+    let values = || chart.lines.iter().flat_map(|line| line.y.iter().flatten().copied());
     let (low, high) = values().fold((0.0f64, 0.0f64), |(low, high), y| (low.min(y), high.max(y)));
     let margin = 0.05 * (high - low).max(1e-3);
     let end = chart.t.last().copied().unwrap_or(1.0).max(1e-3);
     let mut plot = ChartBuilder::on(area)
-        .caption(
-            format!("{} ({})", chart.title, chart.unit),
-            ("sans-serif", 18),
-        )
+        .caption(format!("{} ({})", chart.title, chart.unit), ("sans-serif", 18))
         .margin(8)
         .x_label_area_size(34)
         .y_label_area_size(52)
         .build_cartesian_2d(0.0..end, low - margin..high + margin)?;
-    plot.configure_mesh()
-        .light_line_style(WHITE)
-        .x_desc("t (s)")
-        .draw()?;
+    plot.configure_mesh().light_line_style(WHITE).x_desc("t (s)").draw()?;
     for span in &chart.boxes {
-        let corners = [
-            (span.from, span.min.max(low - margin)),
-            (span.until, span.max.min(high + margin)),
-        ];
+        let corners = [(span.from, span.min.max(low - margin)), (span.until, span.max.min(high + margin))];
         // out of the picture
         if corners[0].1 >= corners[1].1 {
             continue;
@@ -72,29 +54,16 @@ fn plot(
             Paint::Command => (RGBColor(0x99, 0x99, 0x99), 1),
             Paint::Palette(i) => (PALETTE[i % PALETTE.len()], 2),
         };
-        let points = chart
-            .t
-            .iter()
-            .zip(&line.y)
-            .step_by(stride)
-            .filter_map(|(t, y)| Some((*t, (*y)?)));
-        let legend =
-            move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(width));
+        let points = chart.t.iter().zip(&line.y).step_by(stride).filter_map(|(t, y)| Some((*t, (*y)?)));
+        let legend = move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(width));
         let style = color.stroke_width(width);
         if line.dashed {
-            plot.draw_series(DashedLineSeries::new(points, 6, 4, style))?
-                .label(&line.label)
-                .legend(legend);
+            plot.draw_series(DashedLineSeries::new(points, 6, 4, style))?.label(&line.label).legend(legend);
         } else {
-            plot.draw_series(LineSeries::new(points, style))?
-                .label(&line.label)
-                .legend(legend);
+            plot.draw_series(LineSeries::new(points, style))?.label(&line.label).legend(legend);
         }
     }
-    plot.configure_series_labels()
-        .background_style(WHITE.mix(0.8))
-        .border_style(TRANSPARENT)
-        .draw()?;
+    plot.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(TRANSPARENT).draw()?;
     area.present()?;
     Ok(())
 }

@@ -12,33 +12,19 @@ use crate::verdict::{Check, Verdict};
 
 /// The whole report: segments and latencies per variant, sweeps, verdict last.
 pub fn render(report: &RunReport) -> String {
-    let mut out = format!(
-        "{}\nseed {}, {}, force along {}\n",
-        report.title, report.seed, report.pacing, report.axis
-    );
+    let mut out = format!("{}\nseed {}, {}, force along {}\n", report.title, report.seed, report.pacing, report.axis);
     let mut shown: Option<&[SegmentRow]> = None;
     for variant in &report.variants {
         if !variant.ideal.is_empty() && shown.is_none_or(|rows| rows != variant.ideal) {
-            let of = if report
-                .variants
-                .iter()
-                .all(|other| other.ideal == variant.ideal)
-            {
+            let of = if report.variants.iter().all(|other| other.ideal == variant.ideal) {
                 String::new()
             } else {
                 format!(", {}", variant.name)
             };
-            out += &format!(
-                "\nideal impedance, one axis{of}\n{}",
-                table(&HEADINGS, &segments(&variant.ideal))
-            );
+            out += &format!("\nideal impedance, one axis{of}\n{}", table(&HEADINGS, &segments(&variant.ideal)));
             shown = Some(&variant.ideal);
         }
-        out += &format!(
-            "\n{}\n{}",
-            variant.name,
-            table(&HEADINGS, &segments(&variant.segments))
-        );
+        out += &format!("\n{}\n{}", variant.name, table(&HEADINGS, &segments(&variant.segments)));
         for finding in &variant.findings {
             out += &format!("  {finding}\n");
         }
@@ -47,11 +33,7 @@ pub fn render(report: &RunReport) -> String {
     let mut accounted: Option<&BusAccount> = None;
     for variant in &report.variants {
         if !variant.transfers.is_empty() && shown.is_none_or(|paths| paths != variant.transfers) {
-            out += &format!(
-                "\nmodelled latency of bus transfers, {}\n{}",
-                variant.name,
-                latencies(&variant.transfers)
-            );
+            out += &format!("\nmodelled latency of bus transfers, {}\n{}", variant.name, latencies(&variant.transfers));
             shown = Some(&variant.transfers);
         }
         if let Some(bus) = variant.bus.as_ref().filter(|bus| accounted != Some(*bus)) {
@@ -59,11 +41,7 @@ pub fn render(report: &RunReport) -> String {
             accounted = Some(bus);
         }
         if !variant.measured.is_empty() {
-            out += &format!(
-                "\nmeasured latency, {}\n{}",
-                variant.name,
-                latencies(&variant.measured)
-            );
+            out += &format!("\nmeasured latency, {}\n{}", variant.name, latencies(&variant.measured));
         }
     }
     for sweep in &report.sweeps {
@@ -90,17 +68,8 @@ pub fn verdict(verdict: Verdict) -> &'static str {
 }
 
 /// Headings of the segment table.
-pub(crate) const HEADINGS: [&str; 9] = [
-    "segment",
-    "until s",
-    "F_d N",
-    "mean N",
-    "error N",
-    "rms N",
-    "peak N",
-    "90 % rise s",
-    "|X−X_d| mm",
-];
+pub(crate) const HEADINGS: [&str; 9] =
+    ["segment", "until s", "F_d N", "mean N", "error N", "rms N", "peak N", "90 % rise s", "|X−X_d| mm"];
 
 /// Cells of the segment table.
 pub(crate) fn segments(rows: &[SegmentRow]) -> Vec<Vec<String>> {
@@ -122,8 +91,7 @@ pub(crate) fn segments(rows: &[SegmentRow]) -> Vec<Vec<String>> {
 }
 
 /// Headings of a latency table.
-pub(crate) const LATENCY_HEADINGS: [&str; 6] =
-    ["path", "n", "min µs", "p50 µs", "p99 µs", "max µs"];
+pub(crate) const LATENCY_HEADINGS: [&str; 6] = ["path", "n", "min µs", "p50 µs", "p99 µs", "max µs"];
 
 /// Cells of a latency table.
 pub(crate) fn latency_rows(paths: &[PathLatency]) -> Vec<Vec<String>> {
@@ -132,11 +100,7 @@ pub(crate) fn latency_rows(paths: &[PathLatency]) -> Vec<Vec<String>> {
         .iter()
         .map(|path| {
             let figures = [path.min_ns, path.p50_ns, path.p99_ns, path.max_ns].map(micro);
-            [
-                vec![path.path.clone(), path.n.to_string()],
-                figures.to_vec(),
-            ]
-            .concat()
+            [vec![path.path.clone(), path.n.to_string()], figures.to_vec()].concat()
         })
         .collect()
 }
@@ -144,35 +108,18 @@ pub(crate) fn latency_rows(paths: &[PathLatency]) -> Vec<Vec<String>> {
 /// A sweep: one row per variant and value, one column per force segment.
 pub(crate) fn sweep_table(sweep: &Sweep) -> (Vec<String>, Vec<Vec<String>>) {
     let mut headings = vec!["variant".to_owned(), sweep.key.clone()];
-    let rows = sweep
-        .points
-        .first()
-        .map_or(&[][..], |point| &point.segments);
-    headings.extend(
-        rows.iter()
-            .filter(|row| row.force_controlled)
-            .map(|row| row.name.clone()),
-    );
+    let rows = sweep.points.first().map_or(&[][..], |point| &point.segments);
+    headings.extend(rows.iter().filter(|row| row.force_controlled).map(|row| row.name.clone()));
     headings.extend(rows.iter().filter(|row| row.force_controlled).map(|row| format!("{} rms", row.name)));
     headings.extend(["first peak N", "bus load %", "ended"].map(str::to_owned));
     let mut points: Vec<_> = sweep.points.iter().collect();
     let order = |name: &str| sweep.points.iter().position(|point| point.variant == name);
-    points.sort_by(|a, b| {
-        order(&a.variant)
-            .cmp(&order(&b.variant))
-            .then(a.value.total_cmp(&b.value))
-    });
+    points.sort_by(|a, b| order(&a.variant).cmp(&order(&b.variant)).then(a.value.total_cmp(&b.value)));
     let cells = points
         .into_iter()
         .map(|point| {
             let mut row = vec![point.variant.clone(), format!("{}", point.value)];
-            row.extend(
-                point
-                    .segments
-                    .iter()
-                    .filter(|row| row.force_controlled)
-                    .map(|row| number(row.mean_n, 2)),
-            );
+            row.extend(point.segments.iter().filter(|row| row.force_controlled).map(|row| number(row.mean_n, 2)));
             let forces = point.segments.iter().filter(|row| row.force_controlled);
             row.extend(forces.map(|row| number(row.rms_error_n, 2)));
             row.push(number(point.run.first_peak_n, 1));
@@ -207,12 +154,7 @@ fn latencies(paths: &[PathLatency]) -> String {
 fn checks(variants: &[VariantResult]) -> String {
     let rows: Vec<_> = variants
         .iter()
-        .flat_map(|variant| {
-            variant
-                .checks
-                .iter()
-                .map(|check| check_row(&variant.name, check))
-        })
+        .flat_map(|variant| variant.checks.iter().map(|check| check_row(&variant.name, check)))
         .collect();
     table(&CHECK_HEADINGS, &rows)
 }
@@ -228,46 +170,28 @@ pub(crate) fn check_row(variant: &str, check: &Check) -> Vec<String> {
         (None, Some(max)) => format!("≤ {max}"),
         (None, None) => String::new(),
     };
-    let segment = check
-        .segment
-        .as_ref()
-        .map_or_else(String::new, |segment| format!(", {segment}"));
+    let segment = check.segment.as_ref().map_or_else(String::new, |segment| format!(", {segment}"));
     let result = match check.passed {
         Some(true) => "ok",
         Some(false) => "VIOLATED",
         None => "not judged",
     };
     let measure = format!("{}{segment}", measure_name(check));
-    vec![
-        variant.to_owned(),
-        measure,
-        number(check.value, 3),
-        limit,
-        result.to_owned(),
-        check.source.clone(),
-    ]
+    vec![variant.to_owned(), measure, number(check.value, 3), limit, result.to_owned(), check.source.clone()]
 }
 
 /// The measure as a scenario names it.
 fn measure_name(check: &Check) -> String {
-    serde_json::to_value(check.measure)
-        .ok()
-        .and_then(|name| name.as_str().map(str::to_owned))
-        .unwrap_or_default()
+    serde_json::to_value(check.measure).ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
 /// A number, or a dash where there is none.
 fn number(value: Option<f64>, digits: usize) -> String {
     match value.filter(|value| value.is_finite()) {
         // no "-0.00"
-        Some(value) => format!(
-            "{:.digits$}",
-            if value.abs() < 0.5 * 10f64.powi(-(digits as i32)) {
-                0.0
-            } else {
-                value
-            }
-        ),
+        Some(value) => {
+            format!("{:.digits$}", if value.abs() < 0.5 * 10f64.powi(-(digits as i32)) { 0.0 } else { value })
+        }
         None => "–".into(),
     }
 }
@@ -276,46 +200,26 @@ fn number(value: Option<f64>, digits: usize) -> String {
 fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
     let figures: Vec<bool> = (0..headings.len())
         .map(|i| {
-            let mut cells = rows
-                .iter()
-                .filter_map(|row| row.get(i))
-                .filter(|cell| *cell != "–");
+            let mut cells = rows.iter().filter_map(|row| row.get(i)).filter(|cell| *cell != "–");
             cells.all(|cell| cell.parse::<f64>().is_ok())
         })
         .collect();
     let width = |i: usize| {
-        let cells = rows
-            .iter()
-            .filter_map(|row| row.get(i))
-            .map(|cell| cell.chars().count());
-        cells
-            .chain([headings[i].chars().count()])
-            .max()
-            .unwrap_or(0)
+        let cells = rows.iter().filter_map(|row| row.get(i)).map(|cell| cell.chars().count());
+        cells.chain([headings[i].chars().count()]).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..headings.len()).map(width).collect();
     let line = |cells: &mut dyn Iterator<Item = &str>| {
         let mut out = String::new();
         for (i, cell) in cells.enumerate() {
             let padding = " ".repeat(widths[i] - cell.chars().count());
-            let (left, right) = if figures[i] {
-                (padding.as_str(), "")
-            } else {
-                ("", padding.as_str())
-            };
+            let (left, right) = if figures[i] { (padding.as_str(), "") } else { ("", padding.as_str()) };
             out += &format!("  {left}{cell}{right}");
         }
         out.trim_end().to_owned() + "\n"
     };
     let mut out = line(&mut headings.iter().copied());
-    out += &line(
-        &mut widths
-            .iter()
-            .map(|width| "─".repeat(*width))
-            .collect::<Vec<_>>()
-            .iter()
-            .map(String::as_str),
-    );
+    out += &line(&mut widths.iter().map(|width| "─".repeat(*width)).collect::<Vec<_>>().iter().map(String::as_str));
     for row in rows {
         out += &line(&mut row.iter().map(String::as_str));
     }
@@ -328,24 +232,15 @@ mod tests {
 
     #[test]
     fn figures_stand_to_the_right_and_text_to_the_left() {
-        let rows = [
-            vec!["a".into(), "1.5".into()],
-            vec!["long".into(), "–".into()],
-            vec!["b".into(), "10.25".into()],
-        ];
-        let expected =
-            "  name      N\n  ────  ─────\n  a       1.5\n  long      –\n  b     10.25\n";
+        let rows = [vec!["a".into(), "1.5".into()], vec!["long".into(), "–".into()], vec!["b".into(), "10.25".into()]];
+        let expected = "  name      N\n  ────  ─────\n  a       1.5\n  long      –\n  b     10.25\n";
         assert_eq!(table(&["name", "N"], &rows), expected);
     }
 
     #[test]
     fn what_is_no_number_is_a_dash() {
         assert_eq!(
-            (
-                number(Some(f64::NAN), 2),
-                number(None, 2),
-                number(Some(-0.001), 2)
-            ),
+            (number(Some(f64::NAN), 2), number(None, 2), number(Some(-0.001), 2)),
             ("–".into(), "–".into(), "0.00".into())
         );
     }

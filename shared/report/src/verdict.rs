@@ -72,10 +72,7 @@ pub fn segments_with(scenario: &Scenario, measure: Measure) -> Option<Vec<String
     let axis = scenario.report.force_axis;
     of_segments(measure).then(|| {
         let segments = scenario.resolved_segments().into_iter();
-        segments
-            .filter(|segment| is_of(measure, segment.selection[axis] == 0))
-            .map(|segment| segment.name)
-            .collect()
+        segments.filter(|segment| is_of(measure, segment.selection[axis] == 0)).map(|segment| segment.name).collect()
     })
 }
 
@@ -102,12 +99,7 @@ pub(crate) fn checks(
         }
         if !of_segments(limit.measure) {
             let cut_short = rows.iter().any(|row| !row.reached);
-            checks.push(check(
-                limit,
-                None,
-                run.value(limit.measure, None),
-                cut_short && excused(ended, variant),
-            ));
+            checks.push(check(limit, None, run.value(limit.measure, None), cut_short && excused(ended, variant)));
             continue;
         }
         let chosen = |row: &&SegmentRow| match limit.segments.is_empty() {
@@ -116,12 +108,7 @@ pub(crate) fn checks(
         };
         for row in rows.iter().filter(chosen) {
             let unjudged = !row.reached && excused(ended, variant);
-            checks.push(check(
-                limit,
-                Some(&row.name),
-                run.value(limit.measure, Some(row)),
-                unjudged,
-            ));
+            checks.push(check(limit, Some(&row.name), run.value(limit.measure, Some(row)), unjudged));
         }
     }
     checks
@@ -137,9 +124,7 @@ fn excused(ended: &Ended, variant: &Variant) -> bool {
 }
 
 fn check(limit: &Limit, segment: Option<&str>, value: Option<f64>, unjudged: bool) -> Check {
-    let holds = |value: f64| {
-        limit.min.is_none_or(|min| value >= min) && limit.max.is_none_or(|max| value <= max)
-    };
+    let holds = |value: f64| limit.min.is_none_or(|min| value >= min) && limit.max.is_none_or(|max| value <= max);
     Check {
         measure: limit.measure,
         segment: segment.map(str::to_owned),

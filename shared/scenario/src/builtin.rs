@@ -11,6 +11,10 @@ pub const SCENARIOS: &[(&str, &str)] = &[
     ("self-motion", include_str!("../../scenarios/self-motion.toml")),
     ("joint-limits", include_str!("../../scenarios/joint-limits.toml")),
     ("friction-compensation", include_str!("../../scenarios/friction-compensation.toml")),
+    ("one-axis-ideal", include_str!("../../scenarios/one-axis-ideal.toml")),
+    ("one-axis-delay", include_str!("../../scenarios/one-axis-delay.toml")),
+    ("one-axis-force-delay", include_str!("../../scenarios/one-axis-force-delay.toml")),
+    ("sampled-wall", include_str!("../../scenarios/sampled-wall.toml")),
     ("bus-stress", include_str!("../../scenarios/bus-stress.toml")),
     ("processor-time", include_str!("../../scenarios/processor-time.toml")),
 ];

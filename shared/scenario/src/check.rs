@@ -43,6 +43,7 @@ fn plant(scenario: &Scenario) -> Result {
     within("plant.friction_scale", plant.friction_scale, 0.0..=10.0, "0 to 10")?;
     positive("plant.runaway_rad_per_s", plant.runaway_rad_per_s)?;
     positive("arm.slide_mass_kg", scenario.arm.slide_mass_kg)?;
+    not_negative("arm.slide_damping_ns_per_m", scenario.arm.slide_damping_ns_per_m)?;
     not_negative("arm.tool.mass_kg", scenario.arm.tool.mass_kg)?;
     if let Some(mismatch) = &plant.mismatch {
         not_negative("plant.mismatch.origin_m", mismatch.origin_m)?;

@@ -17,7 +17,8 @@ impl Scenario {
                     return Err("robot = \"urdf\" needs the keys arm.urdf and arm.tip_link".into());
                 };
                 let xml = std::fs::read_to_string(file).map_err(|error| format!("{file}: {error}"))?;
-                ArmModel::from_urdf(&xml, self.arm.base_link.as_deref(), tip).map_err(|error| format!("{file}: {error}"))?
+                ArmModel::from_urdf(&xml, self.arm.base_link.as_deref(), tip)
+                    .map_err(|error| format!("{file}: {error}"))?
             }
         };
         Ok(if arm.is_slide() { arm } else { arm.with_gravity(gravity) })
@@ -46,7 +47,10 @@ impl Scenario {
     pub fn drives(&self) -> Result<DriveData, String> {
         match &self.arm.drives {
             None if self.arm.robot == Robot::Slide => {
-                DriveData::from_toml(include_str!("../../scenarios/slide.drives.toml")).map_err(|error| error.to_string())
+                let text = include_str!("../../scenarios/slide.drives.toml");
+                let mut drives = DriveData::from_toml(text).map_err(|error| error.to_string())?;
+                drives.joints[0].viscous_nms_per_rad = self.arm.slide_damping_ns_per_m;
+                Ok(drives)
             }
             None => Ok(DriveData::rediestro()),
             Some(file) => {
@@ -91,6 +95,12 @@ impl Scenario {
     /// Base address of a card of the rack.
     pub fn card_base(&self, name: &str) -> Option<u32> {
         self.rack.slaves.iter().find(|slave| slave.name == name).map(|slave| slave.base)
+    }
+
+    /// The value of a key (as overrides name it), where the scenario has one.
+    pub fn value(&self, key: &str) -> Option<toml::Value> {
+        let tree = toml::Table::try_from(self).ok()?;
+        crate::overrides::get(&tree, key).cloned()
     }
 
     /// Index of the board's first task.

@@ -23,6 +23,8 @@ pub struct Document {
     tree: Table,
     /// Keys that the command line has set, and the words that set them.
     set: Vec<(String, String)>,
+    /// Keys that are varied and their values: they hold in every variant, whatever it sets itself.
+    varied: Vec<(String, Value)>,
 }
 
 /// Reads the scenario of that name or path and applies `overrides` (`key.path=value`). The whole of it,
@@ -41,7 +43,7 @@ impl Document {
         };
         let name =
             Path::new(&file).file_stem().map_or_else(|| "scenario".into(), |stem| stem.to_string_lossy().into_owned());
-        let mut document = Document { name, file, text, folder, tree: Table::new(), set: Vec::new() };
+        let mut document = Document { name, file, text, folder, tree: Table::new(), set: Vec::new(), varied: Vec::new() };
         document.tree = document
             .text
             .parse::<Table>()
@@ -77,16 +79,22 @@ impl Document {
                 overrides::set(&mut tree, &key, value)
                     .map_err(|problem| from_override(&format!("variant {}", variant.name), problem))?;
             }
+            for (key, value) in &self.varied {
+                overrides::vary(&mut tree, key, value.clone())
+                    .map_err(|problem| from_override(&format!("{key}={value}"), problem))?;
+            }
             resolved.push((variant.clone(), self.resolve(&tree, Some(&variant.name))?));
         }
         Ok(resolved)
     }
 
-    /// This scenario with one more override.
+    /// This scenario with one more override, which holds in every variant, even where the variant sets that key.
     pub fn with(&self, key: &str, value: Value) -> Result<Document, ScenarioError> {
         let mut document = self.clone();
         let origin = format!("{key}={value}");
-        let key = overrides::vary(&mut document.tree, key, value).map_err(|problem| from_override(&origin, problem))?;
+        let key =
+            overrides::vary(&mut document.tree, key, value.clone()).map_err(|problem| from_override(&origin, problem))?;
+        document.varied.push((key.clone(), value));
         document.set.push((key, origin));
         Ok(document)
     }
@@ -103,6 +111,7 @@ impl Document {
             *file = self.folder.join(&*file).to_string_lossy().into_owned();
         }
         preset_times(&mut scenario, tree);
+        widen_receiver(&mut scenario);
         check::check(&scenario).map_err(problem)?;
         Ok(scenario)
     }
@@ -133,6 +142,14 @@ impl Document {
             text: NamedSource::new(&self.file, self.text.clone()),
             span: SourceSpan::from(start..span.end.clamp(start, self.text.len())),
         }
+    }
+}
+
+/// A receiver of more than 16 bits, for comparison with theory, has words of 32 in the same window.
+fn widen_receiver(scenario: &mut Scenario) {
+    if scenario.force_sensor_if.full_scale_counts > 32768.0 {
+        let cards = scenario.rack.slaves.iter_mut().filter(|slave| slave.name == "force-sensor");
+        cards.for_each(|card| card.width = vme::Width::D32);
     }
 }
 

@@ -50,18 +50,21 @@ fn elements(array: &[Value]) -> String {
 
 /// As [`set`]; a whole number takes the place of an integer as one.
 pub fn vary(root: &mut Table, key: &str, value: Value) -> Result<String, Problem> {
-    let mut place = Some(&*root).and_then(|root| root.get(key.split('.').next()?));
-    for part in key.split('.').skip(1) {
-        place = place.and_then(|place| match place {
-            Value::Array(array) => array.get(index(array, part)?),
-            other => other.get(part),
-        });
-    }
-    let value = match (place, value) {
+    let value = match (get(root, key), value) {
         (Some(Value::Integer(_)), Value::Float(number)) if number.fract() == 0.0 => Value::Integer(number as i64),
         (_, value) => value,
     };
     set(root, key, value)
+}
+
+/// What stands at a key.
+pub fn get<'a>(root: &'a Table, key: &str) -> Option<&'a Value> {
+    let mut parts = key.split('.');
+    let first = root.get(parts.next()?)?;
+    parts.try_fold(first, |place, part| match place {
+        Value::Array(array) => array.get(index(array, part)?),
+        other => other.get(part),
+    })
 }
 
 /// An element by number or by name.

@@ -10,10 +10,7 @@ const PERIOD_S: f64 = 0.005;
 
 /// The scenario and its variants.
 pub fn table_5_3() -> Vec<(Variant, Scenario)> {
-    scenario::load("table-5-3", &[])
-        .unwrap()
-        .variants()
-        .unwrap()
+    scenario::load("table-5-3", &[]).unwrap().variants().unwrap()
 }
 
 /// A run along z whose force is off by `error_n` (it never touches where the error is NaN), cut at `until_s`.
@@ -25,27 +22,16 @@ pub fn trace(scenario: &Scenario, error_n: f64, until_s: f64) -> Trace {
         let t = k as f64 * PERIOD_S;
         let touched = !error_n.is_nan();
         let force = |x: f64| {
-            if touched {
-                (10_000.0 * (x - 0.005)).max(0.0)
-            } else {
-                0.0
-            }
+            if touched { (10_000.0 * (x - 0.005)).max(0.0) } else { 0.0 }
         };
         let at = (t * 1e9).round() as u64;
-        let mut plant = PlantProbe {
-            t: at,
-            ..PlantProbe::zeroed()
-        };
+        let mut plant = PlantProbe { t: at, ..PlantProbe::zeroed() };
         plant.contact[2] = force(x);
         plant.position[2] = if touched { x } else { 1e-4 * t };
         plant.q = scenario.arm.posture_deg.map(f64::to_radians);
         plant.qd = [0.1 * v; 7];
         trace.plant.push(plant);
-        let mut control = ControlProbe {
-            t: at,
-            job: k as u32,
-            ..ControlProbe::zeroed()
-        };
+        let mut control = ControlProbe { t: at, job: k as u32, ..ControlProbe::zeroed() };
         control.xt[2] = x + 0.0005;
         control.torque = std::array::from_fn(|i| 20.0 + (1.0 + i as f64) * force(x) * 0.1);
         trace.control.push(control);
@@ -55,12 +41,8 @@ pub fn trace(scenario: &Scenario, error_n: f64, until_s: f64) -> Trace {
         };
         let h = PERIOD_S / f64::from(steps);
         for _ in 0..steps {
-            let (s, m, b, k) = (
-                f64::from(segment.selection[2]),
-                segment.mass[2],
-                segment.damping[2],
-                segment.stiffness[2],
-            );
+            let (s, m, b, k) =
+                (f64::from(segment.selection[2]), segment.mass[2], segment.damping[2], segment.stiffness[2]);
             let wanted = segment.force[2] + if touched { error_n } else { 0.0 };
             v += h / m * ((1.0 - s) * wanted - b * v - s * k * x - force(x));
             x += h * v;
@@ -74,22 +56,12 @@ pub fn ledger(scenario: &Scenario) -> Ledger {
     let mut ledger = Ledger::new(scenario);
     for job in 0..1000 {
         for (i, card) in scenario.rack.slaves.iter().enumerate() {
-            let dir = if card.board == "da_io" {
-                Direction::Write
-            } else {
-                Direction::Read
-            };
+            let dir = if card.board == "da_io" { Direction::Write } else { Direction::Read };
             ledger.push(&Transfer {
                 task: 0,
                 job,
                 index: i as u16,
-                access: Access {
-                    am: card.am,
-                    addr: card.base,
-                    width: Width::D32,
-                    dir,
-                    n: 1,
-                },
+                access: Access { am: card.am, addr: card.base, width: Width::D32, dir, n: 1 },
                 slave: Some(i as u16),
                 requested: 0,
                 granted: 300,
@@ -110,13 +82,5 @@ pub fn ledger(scenario: &Scenario) -> Ledger {
 /// The result of a made-up run that was completed.
 pub fn result(variant: &Variant, scenario: &Scenario, error_n: f64) -> VariantResult {
     let trace = trace(scenario, error_n, 13.0);
-    VariantResult::new(
-        scenario,
-        variant,
-        &trace,
-        &ledger(scenario),
-        Ended::Completed,
-        13.0,
-    )
-    .unwrap()
+    VariantResult::new(scenario, variant, &trace, &ledger(scenario), Ended::Completed, 13.0).unwrap()
 }

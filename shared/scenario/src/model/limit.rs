@@ -59,6 +59,8 @@ pub enum Measure {
     IncapableSegments,
     /// Per run: number of pairs of force segments whose mean forces are not in the order of their F_d.
     ForceOrderViolations,
+    /// Per run: growth of the oscillation of X along the report's axis in the last segment, per period: below 1 it decays.
+    EnvelopeGrowth,
     /// Per run: greatest joint torque sent, as a share of its limit.
     TorqueShare,
     /// Per run: greatest joint speed when all commanded motion has ended (last second), rad/s.

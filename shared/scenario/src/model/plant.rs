@@ -10,6 +10,8 @@ pub struct Arm {
     pub robot: Robot,
     /// Mass on the slide, where `robot = "slide"`.
     pub slide_mass_kg: f64,
+    /// Viscous damping of the slide's bearings, where `robot = "slide"`.
+    pub slide_damping_ns_per_m: f64,
     /// URDF file, where `robot = "urdf"`; relative to the scenario file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub urdf: Option<String>,
@@ -63,6 +65,7 @@ impl Default for Arm {
         Arm {
             robot: Robot::Rediestro,
             slide_mass_kg: 10.0,
+            slide_damping_ns_per_m: 0.0,
             urdf: None,
             base_link: None,
             tip_link: None,

@@ -25,6 +25,7 @@ enum Command {
     Design(commands::design::DesignArgs),
     Sweep(commands::sweep::SweepArgs),
     Margin(commands::margin::MarginArgs),
+    Compare(commands::compare::CompareArgs),
     /// Hosts the boards of one process; `vmerack run` starts it.
     #[command(hide = true)]
     Host {
@@ -55,6 +56,7 @@ pub fn main() -> ExitCode {
         Command::Design(args) => commands::design::run(args),
         Command::Sweep(args) => commands::sweep::run(args),
         Command::Margin(args) => commands::margin::run(args),
+        Command::Compare(args) => commands::compare::run(args),
         Command::Host { .. } => Ok(0),
     };
     match outcome {

@@ -2,6 +2,7 @@
 
 pub mod arm;
 pub mod bus;
+pub mod compare;
 pub mod design;
 pub mod log;
 pub mod margin;

@@ -34,7 +34,7 @@ mod urdf;
 pub use aba::aba;
 pub use crba::crba;
 pub use inertia::BodyInertia;
-pub use kinematics::{Pose, TipMotion, forward_kinematics, jacobian, jdot_qd, tip_motion};
+pub use kinematics::{Pose, TipMotion, forward_kinematics, jacobian, jdot_qd, joint_origins, tip_motion};
 pub use mismatch::Mismatch;
 pub use model::{ArmModel, Tool};
 pub use rnea::{bias, gravity_torque, rnea};

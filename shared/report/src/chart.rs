@@ -1,47 +1,60 @@
 //! The report's pictures as data; [`crate::html`] and [`crate::svg`] draw the same.
 
 use crate::ideal::Ideal;
+use crate::path::Way;
 use crate::result::RunReport;
 use crate::series::Series;
 use messages::JOINTS;
 use scenario::Measure;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Points per line at most: a 13 s run at 200 Hz goes in whole.
 const POINTS: usize = 2600;
+/// The same where there is a line per joint.
+const JOINT_POINTS: usize = 900;
 
-/// A run's signals along the report's axis.
+/// A run's signals.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Curves {
+    /// Along the report's axis.
     pub force: Series,
-    pub position: Series,
+    /// Along x, y, z.
+    pub position: [Series; 3],
+    /// X_d along the report's axis.
+    pub desired: Series,
+    /// Xᵗ along the report's axis.
     pub target: Series,
+    /// Angle between X and X_d, degrees.
+    pub turn: Series,
+    /// Per joint, % of the way from the middle of its range to its limit.
+    pub angle: [Series; JOINTS],
     /// Per joint, % of its limit.
     pub torque: [Series; JOINTS],
     pub ideal: Ideal,
+    pub way: Way,
 }
 
 /// One picture: lines over the same instants.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Chart {
     pub title: String,
-    pub unit: &'static str,
+    pub unit: String,
     pub t: Vec<f64>,
     pub lines: Vec<Line>,
     pub boxes: Vec<Span>,
     pub tall: bool,
 }
 
-/// One line. `color` counts a palette; the ideal and the command have their own.
-#[derive(Clone, Debug, Serialize)]
+/// One line. `color` counts a palette; the ideal and the command have their own. `dash` counts strokes; 0 is solid.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Line {
     pub label: String,
     pub color: Paint,
-    pub dashed: bool,
+    pub dash: usize,
     pub y: Vec<Option<f64>>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Paint {
     Ideal,
@@ -50,7 +63,7 @@ pub(crate) enum Paint {
 }
 
 /// Where a limit applies: from, until (s), least, greatest; `allowed` says on which side of it one is inside.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Span {
     pub allowed: bool,
     pub from: f64,
@@ -63,71 +76,102 @@ pub(crate) struct Span {
 pub(crate) fn charts(report: &RunReport) -> Vec<Chart> {
     let end = report.variants.iter().map(|variant| variant.simulated_s).fold(0.0, f64::max);
     let densest = report.variants.iter().map(|variant| variant.curves.force.t.len()).max().unwrap_or(0);
-    let n = densest.clamp(2, POINTS);
-    let grid: Vec<f64> = (0..n).map(|i| round(end * i as f64 / (n - 1) as f64, 4)).collect();
-    let axis = report.axis;
-    let line = |label: &str, color: usize, of: &Series, scale: f64| Line {
+    let instants = |most: usize| -> Vec<f64> {
+        let n = densest.clamp(2, most);
+        (0..n).map(|i| round(end * i as f64 / (n - 1) as f64, 4)).collect()
+    };
+    let grid = instants(POINTS);
+    let line = |label: &str, color: usize, of: &Series, scale: f64, grid: &[f64]| Line {
         label: label.to_owned(),
         color: Paint::Palette(color),
-        dashed: false,
-        y: sample(of, &grid, scale),
+        dash: 0,
+        y: sample(of, grid, scale),
     };
-    let ideals = || {
-        // variants whose ideal is the same share a line
-        let mut shown: Vec<(&str, &Ideal)> = Vec::new();
-        for variant in &report.variants {
-            let ideal = &variant.curves.ideal;
-            let same = |other: &Ideal| {
-                let pairs = ideal.force.y.iter().zip(&other.force.y);
-                pairs.clone().count() > 0 && pairs.into_iter().all(|(a, b)| (a - b).abs() < 0.05)
-            };
-            if !ideal.force.t.is_empty() && !shown.iter().any(|(_, other)| same(other)) {
-                shown.push((&variant.name, ideal));
-            }
-        }
-        let single = shown.len() == 1;
-        shown.into_iter().map(move |(name, ideal)| {
-            (if single { "ideal impedance".to_owned() } else { format!("ideal of {name}") }, ideal)
-        })
+    let each = |of: &dyn Fn(&Curves) -> Series, scale: f64| -> Vec<Line> {
+        let variants = report.variants.iter().enumerate();
+        variants.map(|(i, variant)| line(&variant.name, i, &of(&variant.curves), scale, &grid)).collect()
     };
-    let reference = |label: String, of: &Series, scale: f64| Line {
-        label,
-        color: Paint::Ideal,
-        dashed: true,
-        y: sample(of, &grid, scale),
+    let dashed = |label: String, color: Paint, y: Vec<Option<f64>>| Line { label, color, dash: 1, y };
+    let chart = |title: String, unit: &str, lines, boxes, tall| Chart {
+        title,
+        unit: unit.to_owned(),
+        t: grid.clone(),
+        lines,
+        boxes,
+        tall,
     };
-    let chart = |title: String, unit, lines, boxes, tall| Chart { title, unit, t: grid.clone(), lines, boxes, tall };
+    let axis = report.axis;
 
-    let mut force =
-        vec![Line { label: "F_d".into(), color: Paint::Command, dashed: true, y: commanded(report, &grid) }];
-    let mut position = Vec::new();
-    let mut error = Vec::new();
-    for (i, variant) in report.variants.iter().enumerate() {
-        force.push(line(&variant.name, i, &variant.curves.force, 1.0));
-        position.push(line(&variant.name, i, &variant.curves.position, 1e3));
-        let difference = Series {
-            t: variant.curves.target.t.clone(),
-            y: (variant.curves.target.t.iter().zip(&variant.curves.target.y))
-                .map(|(t, target)| target - variant.curves.position.at(*t).unwrap_or(*target))
-                .collect(),
-        };
-        error.push(line(&variant.name, i, &difference, 1e3));
-    }
+    let mut force = vec![dashed("F_d".into(), Paint::Command, commanded(report, &grid))];
+    force.extend(each(&|curves| curves.force.clone(), 1.0));
     // dashed, and last: it must be seen on top of a run that follows it
-    force.extend(ideals().map(|(label, ideal)| reference(label, &ideal.force, 1.0)));
-    position.extend(ideals().map(|(label, ideal)| reference(label, &ideal.position, 1e3)));
-    let mut charts = vec![
-        chart(format!("Contact force along {axis}"), "N", force, limits(report), true),
-        chart(format!("Tool position along {axis}"), "mm", position, Vec::new(), false),
-        chart(format!("Target error Xᵗ − X along {axis}"), "mm", error, Vec::new(), false),
-    ];
-    for variant in &report.variants {
-        let lines = (0..JOINTS).map(|i| line(&format!("joint {}", i + 1), i, &variant.curves.torque[i], 1.0)).collect();
-        let limit = |min, max| Span { allowed: false, from: 0.0, until: end, min, max };
-        let boxes = vec![limit(100.0, 1000.0), limit(-1000.0, -100.0)];
-        charts.push(chart(format!("Joint torques: {}", variant.name), "% of limit", lines, boxes, false));
+    let ideals = ideals(report);
+    force.extend(ideals.iter().map(|(label, ideal)| dashed(label.clone(), Paint::Ideal, sample(&ideal.force, &grid, 1.0))));
+    let mut charts = vec![chart(format!("Contact force along {axis}"), "N", force, force_limits(report), true)];
+    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let mut lines = each(&|curves| curves.position[k].clone(), 1e3);
+        let mut boxes = Vec::new();
+        if name == axis {
+            lines.extend(
+                ideals.iter().map(|(label, ideal)| dashed(label.clone(), Paint::Ideal, sample(&ideal.position, &grid, 1e3))),
+            );
+            boxes = position_limits(report);
+        }
+        charts.push(chart(format!("Tool position along {name}"), "mm", lines, boxes, false));
     }
+    let error = |curves: &Curves| Series {
+        t: curves.target.t.clone(),
+        y: (curves.target.t.iter().zip(&curves.target.y))
+            .map(|(t, target)| target - report.along(&curves.position).at(*t).unwrap_or(*target))
+            .collect(),
+    };
+    charts.push(chart(format!("Target error Xᵗ − X along {axis}"), "mm", each(&error, 1e3), Vec::new(), false));
+    charts.push(chart(
+        "Orientation: angle between X and X_d".into(),
+        "deg",
+        each(&|curves| curves.turn.clone(), 1.0),
+        Vec::new(),
+        false,
+    ));
+    let coarse = instants(JOINT_POINTS);
+    let limit = |min, max| Span { allowed: false, from: 0.0, until: end, min, max };
+    for variant in &report.variants {
+        let curves = &variant.curves;
+        for (title, unit, series) in [
+            ("Joint angles", "% of the way to the limit", &curves.angle),
+            ("Joint torques", "% of the limit", &curves.torque),
+        ] {
+            charts.push(Chart {
+                title: format!("{title}: {}", variant.name),
+                unit: unit.into(),
+                t: coarse.clone(),
+                lines: (0..JOINTS).map(|i| line(&format!("joint {}", i + 1), i, &series[i], 1.0, &coarse)).collect(),
+                boxes: vec![limit(100.0, 1000.0), limit(-1000.0, -100.0)],
+                tall: false,
+            });
+        }
+    }
+    // a picture of lines that are all flat and the same shows nothing
+    charts.retain(|chart| chart.tall || chart.lines.iter().any(|line| line.y.iter().flatten().any(|y| y.abs() > 1e-9)));
     charts
+}
+
+/// Ideal impedances and what they are called; variants whose ideal is the same share one.
+fn ideals(report: &RunReport) -> Vec<(String, &Ideal)> {
+    let mut shown: Vec<(&str, &Ideal)> = Vec::new();
+    let same = |a: &Series, b: &Series, tolerance: f64| {
+        a.y.len() == b.y.len() && a.y.iter().zip(&b.y).all(|(a, b)| (a - b).abs() < tolerance)
+    };
+    for variant in &report.variants {
+        let ideal = &variant.curves.ideal;
+        let known = |other: &Ideal| same(&ideal.force, &other.force, 0.05) && same(&ideal.position, &other.position, 1e-5);
+        if !ideal.force.t.is_empty() && !shown.iter().any(|(_, other)| known(other)) {
+            shown.push((&variant.name, ideal));
+        }
+    }
+    let single = shown.len() == 1;
+    let label = |name: &str| if single { "ideal impedance".to_owned() } else { format!("ideal of {name}") };
+    shown.into_iter().map(|(name, ideal)| (label(name), ideal)).collect()
 }
 
 /// The value of each grid interval that lies farthest from the one before, so that no peak is lost.
@@ -160,7 +204,7 @@ fn commanded(report: &RunReport, grid: &[f64]) -> Vec<Option<f64>> {
 }
 
 /// Limits on forces, as areas of the force picture.
-fn limits(report: &RunReport) -> Vec<Span> {
+fn force_limits(report: &RunReport) -> Vec<Span> {
     let mut boxes: Vec<Span> = Vec::new();
     for variant in &report.variants {
         for check in &variant.checks {
@@ -184,6 +228,28 @@ fn limits(report: &RunReport) -> Vec<Span> {
                 }
                 _ => continue,
             };
+            if !boxes.contains(&span) {
+                boxes.push(span);
+            }
+        }
+    }
+    boxes
+}
+
+/// Limits on where X may end, as areas of the position picture (mm).
+fn position_limits(report: &RunReport) -> Vec<Span> {
+    let mut boxes: Vec<Span> = Vec::new();
+    for variant in &report.variants {
+        for check in &variant.checks {
+            let row = variant.segments.iter().find(|row| Some(&row.name) == check.segment.as_ref());
+            let (Measure::PositionErrorM | Measure::EncoderPositionErrorM, Some(row), Some(max), None) =
+                (check.measure, row, check.max, &check.relative_to)
+            else {
+                continue;
+            };
+            let Some(wanted) = variant.curves.desired.at(row.end_s) else { continue };
+            let (from, until) = (row.end_s - 0.1 * (row.end_s - row.start_s), row.end_s);
+            let span = Span { allowed: true, from, until, min: 1e3 * (wanted - max), max: 1e3 * (wanted + max) };
             if !boxes.contains(&span) {
                 boxes.push(span);
             }

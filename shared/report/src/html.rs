@@ -4,7 +4,8 @@ use crate::accounting::WaterfallAccount;
 use crate::bus_rows::{
     AGE_HEADINGS, MASTER_HEADINGS, TASK_HEADINGS, WATERFALL_HEADINGS, counts, masters, part_name, tasks, waterfall,
 };
-use crate::chart::charts;
+use crate::chart::Chart;
+use crate::path;
 use crate::result::RunReport;
 use crate::svg;
 use crate::text::{
@@ -21,24 +22,51 @@ const UPLOT_STYLE: &str = include_str!("../vendor/uplot/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("../vendor/uplot/LICENSE");
 
 /// The whole file; the message says what could not be drawn.
-pub(crate) fn render(report: &RunReport) -> Result<String, String> {
-    let charts = charts(report);
-    let data = serde_json::to_string(&charts).map_err(|error| error.to_string())?;
+pub(crate) fn render(report: &RunReport, charts: &[Chart]) -> Result<String, String> {
+    let title = format!("{}{}", escape(&report.title), pill(report.verdict));
+    let sections = [
+        section("The arm and the tool's path", "", &path::draw(report)),
+        section("Limits", "", &checks(report)),
+        section("Segments", SEGMENTS_NOTE, &segment_tables(report)),
+        format!("<section>{}</section>", sweeps(report)),
+        section("From sensor to actuator", WATERFALL_NOTE, &waterfalls(report)),
+        section("Latency of bus transfers", "From the bus request to the end of the last cycle.", &latencies(report)),
+        section("Bus and processors", BUS_NOTE, &bus(report)),
+        format!("<section class=about><h2>About the scenario</h2>{}</section>", paragraphs(&report.description)),
+    ];
+    let head = Head { name: &report.scenario, title: &title, facts: &facts(report), cards: &cards(report) };
+    fill_page(&head, charts, &sections.concat())
+}
+
+const SEGMENTS_NOTE: &str = "True contact force along the report's axis; mean and rms over the last second; 90 % rise from the \
+    first contact, or from the segment's start where the tool touches already.";
+const WATERFALL_NOTE: &str = "Where the time goes from what the force sensor felt to the change of the last D/A output, mean of \
+    all control jobs, in simulated time. The parts add up to the whole to the nanosecond.";
+const BUS_NOTE: &str = "Simulated time. Bounds are worst cases without faults; “none” where no bound is known.";
+
+/// A page of its own kind: `note` stands under the title, `sections` below the pictures.
+pub(crate) fn page(name: &str, title: &str, note: &str, charts: &[Chart], sections: &str) -> Result<String, String> {
+    fill_page(&Head { name, title: &escape(title), facts: &escape(note), cards: "" }, charts, sections)
+}
+
+/// What stands above the pictures, as markup but for the name.
+struct Head<'a> {
+    name: &'a str,
+    title: &'a str,
+    facts: &'a str,
+    cards: &'a str,
+}
+
+fn fill_page(head: &Head, charts: &[Chart], sections: &str) -> Result<String, String> {
+    let data = serde_json::to_string(charts).map_err(|error| error.to_string())?;
     let pictures: Result<Vec<String>, String> = charts.iter().map(svg::draw).collect();
     let parts = [
-        ("title", escape(&report.title)),
-        ("scenario", escape(&report.scenario)),
-        ("verdict", verdict(report.verdict).to_owned()),
-        ("verdict_class", class(report.verdict).to_owned()),
-        ("facts", facts(report)),
-        ("description", paragraphs(&report.description)),
-        ("cards", cards(report)),
+        ("name", escape(head.name)),
+        ("title", head.title.to_owned()),
+        ("facts", head.facts.to_owned()),
+        ("cards", head.cards.to_owned()),
         ("pictures", pictures?.join("\n")),
-        ("checks", checks(report)),
-        ("segments", segment_tables(report)),
-        ("sweeps", sweeps(report)),
-        ("latencies", latencies(report)),
-        ("bus", bus(report)),
+        ("sections", sections.to_owned()),
         ("style", format!("{UPLOT_STYLE}\n{STYLE}")),
         ("uplot", format!("/*\n{UPLOT_LICENCE}\n*/\n{UPLOT}")),
         // "</" must not end the script element
@@ -46,6 +74,19 @@ pub(crate) fn render(report: &RunReport) -> Result<String, String> {
         ("script", SCRIPT.to_owned()),
     ];
     Ok(fill(TEMPLATE, &parts))
+}
+
+/// A section with a heading; nothing where it has no content.
+fn section(heading: &str, note: &str, content: &str) -> String {
+    if content.is_empty() {
+        return String::new();
+    }
+    let note = if note.is_empty() { String::new() } else { format!("<p class=note>{note}</p>") };
+    format!("<section><h2>{heading}</h2>{note}{content}</section>")
+}
+
+fn pill(of: Verdict) -> String {
+    format!("<span class=\"verdict {}\">{}</span>", class(of), verdict(of))
 }
 
 /// Replaces `{{name}}`; what is put in is not looked at again.
@@ -179,10 +220,9 @@ fn bus(report: &RunReport) -> String {
         };
         shown = Some(bus);
         out += &format!(
-            "<h3>{}</h3><p class=note>{}</p>{}{}{}{}{}",
+            "<h3>{}</h3><p class=note>{}</p>{}{}{}{}",
             escape(&variant.name),
             escape(&counts(bus)),
-            waterfall_bar(&bus.waterfall),
             table(&WATERFALL_HEADINGS, &waterfall(&bus.waterfall)),
             table(&MASTER_HEADINGS, &masters(bus)),
             table(&TASK_HEADINGS, &tasks(bus)),
@@ -192,27 +232,71 @@ fn bus(report: &RunReport) -> String {
     out
 }
 
-/// The mean way as one bar, each part as long as its share.
-fn waterfall_bar(account: &WaterfallAccount) -> String {
-    let parts: String = account
-        .parts
-        .iter()
-        .enumerate()
-        .filter(|(_, part)| part.sum_ns > 0)
-        .map(|(i, part)| {
-            format!(
-                "<i style=\"flex:{};background:hsl({} 55% 50%)\" title=\"{} {:.3} µs\"></i>",
-                part.sum_ns,
-                50 * i,
-                part_name(part.part),
-                1e-3 * account.mean_ns(part.sum_ns)
-            )
-        })
-        .collect();
-    format!("<div style=\"display:flex;height:1.2em;max-width:60em\">{parts}</div>")
+/// The mean way as one bar per part, each beginning where the one before ends.
+fn waterfalls(report: &RunReport) -> String {
+    let mut out = String::new();
+    let mut shown = None;
+    for variant in &report.variants {
+        let Some(account) = variant.bus.as_ref().map(|bus| &bus.waterfall).filter(|account| account.jobs > 0) else {
+            continue;
+        };
+        let means: Vec<u64> = account.parts.iter().map(|part| part.sum_ns / account.jobs).collect();
+        // variants that differ by nanoseconds are one picture
+        let micros: Vec<u64> = means.iter().map(|ns| ns / 1000).collect();
+        if shown.as_ref() == Some(&micros) {
+            continue;
+        }
+        shown = Some(micros);
+        out += &format!("<h3>{}</h3>{}", escape(&variant.name), waterfall_picture(account));
+    }
+    out
 }
 
-fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
+fn waterfall_picture(account: &WaterfallAccount) -> String {
+    const ROW: f64 = 22.0;
+    const NAMES: f64 = 130.0;
+    const BARS: f64 = 560.0;
+    const FIGURES: f64 = 130.0;
+    let whole = account.mean_ns(account.whole_sum_ns).max(1.0);
+    let mut rows = String::new();
+    let mut start = 0.0;
+    let parts: Vec<_> = account.parts.iter().filter(|part| part.sum_ns > 0).collect();
+    for (i, part) in parts.iter().enumerate() {
+        let mean = account.mean_ns(part.sum_ns);
+        let (y, middle) = (ROW * i as f64, ROW * i as f64 + 15.0);
+        let (x, width) = (NAMES + BARS * start / whole, (BARS * mean / whole).max(1.0));
+        rows += &format!(
+            "<text x={} y={middle} text-anchor=end>{}</text><rect class=\"w{}\" x={x:.1} y={} width={width:.1} height=16 rx=2 />\
+             <text class=figure x={} y={middle} text-anchor=end>{}</text>",
+            NAMES - 10.0,
+            part_name(part.part),
+            i % 7,
+            y + 3.0,
+            NAMES + BARS + FIGURES - 4.0,
+            micro(mean),
+        );
+        start += mean;
+    }
+    let (low, height) = (ROW * parts.len() as f64, ROW * (parts.len() + 1) as f64 + 4.0);
+    rows += &format!(
+        "<path class=bar d=\"M0 {}H{}\" /><text x={} y={y} text-anchor=end>whole</text>\
+         <text class=figure x={} y={y} text-anchor=end>{}</text>",
+        low + 3.0,
+        NAMES + BARS + FIGURES,
+        NAMES - 10.0,
+        NAMES + BARS + FIGURES - 4.0,
+        micro(whole),
+        y = low + 19.0,
+    );
+    let width = NAMES + BARS + FIGURES;
+    format!("<svg class=waterfall viewBox=\"0 0 {width} {height}\" role=img aria-label=\"latency waterfall\">{rows}</svg>")
+}
+
+fn micro(ns: f64) -> String {
+    format!("{:.1} µs", 1e-3 * ns)
+}
+
+pub(crate) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
     let head: String = headings.iter().map(|heading| format!("<th>{}</th>", escape(heading))).collect();
     let body: String = rows
         .iter()

@@ -8,11 +8,13 @@
 mod accounting;
 mod bus_rows;
 mod chart;
+mod compare;
 mod envelope;
 mod html;
 mod ideal;
 mod ledger;
 mod measures;
+mod path;
 mod result;
 mod segments;
 mod series;
@@ -22,6 +24,7 @@ mod trace;
 mod verdict;
 
 pub use accounting::{Accounting, BusAccount, MasterAccount, PartAccount, Spread, TaskAccount, WaterfallAccount};
+pub use compare::{CompareError, ComparedFigure, Comparison, StoredRun};
 pub use ledger::{Ledger, PathLatency};
 pub use measures::RunMeasures;
 pub use result::{RunReport, SCHEMA_VERSION, Sweep, SweepPoint, VariantResult, WriteError};

@@ -1,14 +1,15 @@
 //! Results of variants, and the report over all of them.
 
 use crate::accounting::BusAccount;
-use crate::chart::Curves;
+use crate::chart::{Curves, charts};
 use crate::ideal::{Ideal, ideal};
 use crate::ledger::{Ledger, PathLatency};
 use crate::measures::{Bounds, RunMeasures, first_contact};
+use crate::path::Way;
 use crate::segments::{SegmentRow, Signals, rows};
 use crate::series::Series;
 use crate::trace::{Ended, Trace, seconds};
-use crate::verdict::{Check, Verdict, checks};
+use crate::verdict::{Check, Verdict, check_relations, checks};
 use messages::EventKind;
 use scenario::{Scenario, Variant};
 use serde::Serialize;
@@ -174,7 +175,20 @@ impl VariantResult {
             measured: Vec::new(),
             record: None,
             digest: None,
-            curves: Curves { force, position, target, torque, ideal: ideal.unwrap_or_default() },
+            curves: Curves {
+                force,
+                position: std::array::from_fn(|k| plant(&|probe| probe.position[k])),
+                desired,
+                target,
+                turn: control(&|probe| angle_between(&probe.x_orientation, &probe.xd_orientation).to_degrees()),
+                angle: std::array::from_fn(|i| {
+                    let (low, high) = (bounds.lower_rad[i], bounds.upper_rad[i]);
+                    control(&|probe| 100.0 * (2.0 * probe.q[i] - low - high) / (high - low))
+                }),
+                torque,
+                ideal: ideal.unwrap_or_default(),
+                way: way(scenario, trace)?,
+            },
         })
     }
 }
@@ -189,6 +203,34 @@ fn series(samples: impl Iterator<Item = (vme::Ns, f64)>) -> Series {
         series.push(seconds(t), y);
     }
     series
+}
+
+/// Angle of the rotation between two unit quaternions, rad.
+fn angle_between(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    // the vector part of a* b, and its scalar part
+    let ([aw, ax, ay, az], [bw, bx, by, bz]) = (*a, *b);
+    let x = aw * bx - ax * bw - ay * bz + az * by;
+    let y = aw * by + ax * bz - ay * bw - az * bx;
+    let z = aw * bz - ax * by + ay * bx - az * bw;
+    let w = aw * bw + ax * bx + ay * by + az * bz;
+    2.0 * (x * x + y * y + z * z).sqrt().atan2(w.abs())
+}
+
+/// The tool's way, and the arm at its beginning and end.
+fn way(scenario: &Scenario, trace: &Trace) -> Result<Way, String> {
+    let model = scenario.controller_arm()?;
+    let ends = [trace.plant.first(), trace.plant.last()];
+    let arm = match model.is_slide() {
+        true => Vec::new(),
+        false => ends
+            .into_iter()
+            .flatten()
+            .filter(|probe| probe.q.iter().all(|q| q.is_finite()))
+            .map(|probe| arm::joint_origins(&model, &probe.q.into()).iter().map(|origin| (*origin).into()).collect())
+            .collect(),
+    };
+    let finite = trace.plant.iter().map(|probe| probe.position).filter(|p| p.iter().all(|p| p.is_finite()));
+    Ok(Way { tool: Way::thin(finite.collect()), arm })
 }
 
 fn ideal_rows(
@@ -292,9 +334,10 @@ impl RunReport {
         name: &str,
         scenario: &Scenario,
         pacing: &str,
-        variants: Vec<VariantResult>,
+        mut variants: Vec<VariantResult>,
         sweeps: Vec<Sweep>,
     ) -> RunReport {
+        check_relations(&scenario.limits, &mut variants);
         RunReport {
             schema_version: SCHEMA_VERSION,
             vmerack: env!("CARGO_PKG_VERSION"),
@@ -315,7 +358,16 @@ impl RunReport {
         serde_json::to_string_pretty(self)
     }
 
-    /// Writes `report.json` and `report.html` into the folder.
+    /// X, Y or Z of three: the report's axis.
+    pub(crate) fn along<'a, T>(&self, three: &'a [T; 3]) -> &'a T {
+        match self.axis {
+            "x" => &three[0],
+            "y" => &three[1],
+            _ => &three[2],
+        }
+    }
+
+    /// Writes `report.json`, `charts.json` (the curves, which `vmerack compare` reads) and `report.html` into the folder.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
         let write = |name: &str, content: Result<String, String>| {
             let path = folder.join(name);
@@ -324,6 +376,8 @@ impl RunReport {
                 .map_err(|reason| WriteError { path, reason })
         };
         write("report.json", self.json().map_err(|error| error.to_string()))?;
-        write("report.html", crate::html::render(self))
+        let charts = charts(self);
+        write("charts.json", serde_json::to_string(&charts).map_err(|error| error.to_string()))?;
+        write("report.html", crate::html::render(self, &charts))
     }
 }

@@ -57,7 +57,7 @@ fn plot(chart: &Chart, area: &DrawingArea<SVGBackend, Shift>) -> Result<(), Box<
         let points = chart.t.iter().zip(&line.y).step_by(stride).filter_map(|(t, y)| Some((*t, (*y)?)));
         let legend = move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(width));
         let style = color.stroke_width(width);
-        if line.dashed {
+        if line.dash > 0 {
             plot.draw_series(DashedLineSeries::new(points, 6, 4, style))?.label(&line.label).legend(legend);
         } else {
             plot.draw_series(LineSeries::new(points, style))?.label(&line.label).legend(legend);

@@ -176,8 +176,9 @@ pub(crate) fn check_row(variant: &str, check: &Check) -> Vec<String> {
         Some(false) => "VIOLATED",
         None => "not judged",
     };
-    let measure = format!("{}{segment}", measure_name(check));
-    vec![variant.to_owned(), measure, number(check.value, 3), limit, result.to_owned(), check.source.clone()]
+    let times = check.relative_to.as_ref().map_or_else(String::new, |other| format!(", times that of {other}"));
+    let measure = format!("{}{segment}{times}", measure_name(check));
+    vec![variant.to_owned(), measure, figure(check.value), limit, result.to_owned(), check.source.clone()]
 }
 
 /// The measure as a scenario names it.
@@ -196,8 +197,19 @@ fn number(value: Option<f64>, digits: usize) -> String {
     }
 }
 
+/// A number of any size in five digits, or a dash where there is none.
+pub(crate) fn figure(value: Option<f64>) -> String {
+    let Some(value) = value.filter(|value| value.is_finite()) else { return "–".into() };
+    let size = value.abs();
+    if size != 0.0 && !(1e-4..1e6).contains(&size) {
+        return format!("{value:.4e}");
+    }
+    let digits = if size == 0.0 { 0 } else { (4 - size.log10().floor() as i32).clamp(0, 8) as usize };
+    format!("{value:.digits$}")
+}
+
 /// Columns as wide as they need to be: text to the left, figures to the right.
-fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
+pub(crate) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
     let figures: Vec<bool> = (0..headings.len())
         .map(|i| {
             let mut cells = rows.iter().filter_map(|row| row.get(i)).filter(|cell| *cell != "–");

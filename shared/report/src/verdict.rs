@@ -24,6 +24,9 @@ pub struct Check {
     pub measure: Measure,
     /// Segment, where the measure is one of segments.
     pub segment: Option<String>,
+    /// Variant whose measure the value is a multiple of; none: the value is the measure itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_to: Option<String>,
     /// Value found.
     pub value: Option<f64>,
     /// Least that passes.
@@ -84,7 +87,46 @@ impl VariantResult {
     }
 }
 
-/// All limits of the scenario that apply to the variant.
+/// Applies the limits that set one variant in relation to another. Where the other one was not run, or a run was cut short,
+/// they are not judged.
+pub(crate) fn check_relations(limits: &[Limit], variants: &mut [VariantResult]) {
+    for limit in limits {
+        let Some(name) = &limit.relative_to else { continue };
+        let other = variants.iter().position(|variant| variant.name == *name);
+        for i in (0..variants.len()).filter(|&i| Some(i) != other) {
+            let own = &variants[i];
+            if !concerns(limit, &own.name) {
+                continue;
+            }
+            let segments: Vec<Option<String>> = match (of_segments(limit.measure), limit.segments.is_empty()) {
+                (false, _) => vec![None],
+                (true, false) => limit.segments.iter().cloned().map(Some).collect(),
+                (true, true) => {
+                    let rows = own.segments.iter().filter(|row| is_of(limit.measure, row.force_controlled));
+                    rows.map(|row| Some(row.name.clone())).collect()
+                }
+            };
+            let mut made = Vec::new();
+            for segment in segments {
+                let of = |variant: &VariantResult| variant.measure(limit.measure, segment.as_deref());
+                let value = other.and_then(|other| Some(of(own)? / of(&variants[other])?)).filter(|value| value.is_finite());
+                let whole = |variant: &VariantResult| variant.segments.iter().all(|row| row.reached);
+                let unjudged = !other.is_some_and(|other| whole(own) && whole(&variants[other]));
+                made.push(check(limit, segment.as_deref(), value, unjudged));
+            }
+            if made.iter().any(|check| check.passed == Some(false)) {
+                variants[i].verdict = Verdict::Failed;
+            }
+            variants[i].checks.extend(made);
+        }
+    }
+}
+
+fn concerns(limit: &Limit, variant: &str) -> bool {
+    limit.variants.is_empty() || limit.variants.iter().any(|name| name == variant)
+}
+
+/// All limits of the scenario that apply to the variant alone.
 pub(crate) fn checks(
     scenario: &Scenario,
     variant: &Variant,
@@ -93,8 +135,8 @@ pub(crate) fn checks(
     run: &RunMeasures,
 ) -> Vec<Check> {
     let mut checks = Vec::new();
-    for limit in &scenario.limits {
-        if !limit.variants.is_empty() && !limit.variants.contains(&variant.name) {
+    for limit in scenario.limits.iter().filter(|limit| limit.relative_to.is_none()) {
+        if !concerns(limit, &variant.name) {
             continue;
         }
         if !of_segments(limit.measure) {
@@ -128,6 +170,7 @@ fn check(limit: &Limit, segment: Option<&str>, value: Option<f64>, unjudged: boo
     Check {
         measure: limit.measure,
         segment: segment.map(str::to_owned),
+        relative_to: limit.relative_to.clone(),
         value,
         min: limit.min,
         max: limit.max,

@@ -239,6 +239,9 @@ fn variants_and_limits(scenario: &Scenario) -> Result {
         if let Some(name) = limit.variants.iter().find(|name| !known(name)) {
             return Err(Problem::new(format!("limit.{i}.variants"), format!("there is no variant `{name}`")));
         }
+        if let Some(name) = limit.relative_to.iter().find(|name| !known(name)) {
+            return Err(Problem::new(format!("limit.{i}.relative_to"), format!("there is no variant `{name}`")));
+        }
         if let Some(name) = limit.segments.iter().find(|name| !scenario.segments.iter().any(|segment| segment.name == **name)) {
             return Err(Problem::new(format!("limit.{i}.segments"), format!("there is no segment `{name}`")));
         }

@@ -25,6 +25,34 @@ function shaded(boxes) {
   };
 }
 
+// what readers without script see is text to those with it: the same pictures, for a paper
+const pictures = new DOMParser().parseFromString(document.getElementById("static").textContent, "text/html").querySelectorAll("svg");
+
+function save(blob, name) {
+  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+function exporters(index, title) {
+  const name = title.replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "");
+  const svg = () => new Blob([new XMLSerializer().serializeToString(pictures[index])], { type: "image/svg+xml" });
+  const png = () => {
+    const image = new Image();
+    image.onload = () => {
+      const canvas = document.createElement("canvas");
+      [canvas.width, canvas.height] = [3 * image.width, 3 * image.height];
+      canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height);
+      canvas.toBlob((blob) => save(blob, name + ".png"), "image/png");
+      URL.revokeObjectURL(image.src);
+    };
+    image.src = URL.createObjectURL(svg());
+  };
+  const button = (text, onclick) => Object.assign(document.createElement("button"), { textContent: text, type: "button", className: "save", onclick });
+  return [button("SVG", () => save(svg(), name + ".svg")), button("PNG", png)];
+}
+
+const DASHES = [undefined, [7, 5], [2, 4], [10, 4, 2, 4]];
 let zooming = false;
 function zoomAll(u, key) {
   if (key !== "x" || zooming) return;
@@ -41,19 +69,20 @@ function draw() {
   host.replaceChildren();
   const axis = { stroke: variable("--soft"), grid: { stroke: variable("--line"), width: 1 }, ticks: { stroke: variable("--line"), width: 1 } };
   const format = (value) => (value == null ? "–" : value.toFixed(2));
-  for (const chart of CHARTS) {
+  for (const [index, chart] of CHARTS.entries()) {
     const box = document.createElement("div");
     box.className = chart.tall ? "chart tall" : "chart";
     const heading = document.createElement("h3");
     heading.append(chart.title + " ");
     heading.append(Object.assign(document.createElement("small"), { textContent: chart.unit }));
+    heading.append(...exporters(index, chart.title));
     box.append(heading);
     host.append(box);
     const series = chart.lines.map((line) => ({
       label: line.label,
       stroke: colorOf(line.color),
       width: typeof line.color === "string" ? 1.5 : 2,
-      dash: line.dashed ? [7, 5] : undefined,
+      dash: DASHES[line.dash % DASHES.length],
       value: (_, value) => format(value),
       points: { show: false },
     }));

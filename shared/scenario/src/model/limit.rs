@@ -14,6 +14,9 @@ pub struct Limit {
     /// Segments (by name) that it applies to, each for itself; empty: all that have the measure.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub segments: Vec<String>,
+    /// Takes the value as a multiple of the same measure of this variant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_to: Option<String>,
     /// Least value that passes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,

@@ -106,15 +106,20 @@ pub(crate) fn charts(report: &RunReport) -> Vec<Chart> {
     force.extend(each(&|curves| curves.force.clone(), 1.0));
     // dashed, and last: it must be seen on top of a run that follows it
     let ideals = ideals(report);
-    force.extend(ideals.iter().map(|(label, ideal)| dashed(label.clone(), Paint::Ideal, sample(&ideal.force, &grid, 1.0))));
+    let ideal_lines = |of: &dyn Fn(&Ideal) -> &Series, scale: f64| -> Vec<Line> {
+        let line = |(i, (label, ideal)): (usize, &(String, &Ideal))| Line {
+            dash: i + 1,
+            ..dashed(label.clone(), Paint::Ideal, sample(of(ideal), &grid, scale))
+        };
+        ideals.iter().enumerate().map(line).collect()
+    };
+    force.extend(ideal_lines(&|ideal| &ideal.force, 1.0));
     let mut charts = vec![chart(format!("Contact force along {axis}"), "N", force, force_limits(report), true)];
     for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
         let mut lines = each(&|curves| curves.position[k].clone(), 1e3);
         let mut boxes = Vec::new();
         if name == axis {
-            lines.extend(
-                ideals.iter().map(|(label, ideal)| dashed(label.clone(), Paint::Ideal, sample(&ideal.position, &grid, 1e3))),
-            );
+            lines.extend(ideal_lines(&|ideal| &ideal.position, 1e3));
             boxes = position_limits(report);
         }
         charts.push(chart(format!("Tool position along {name}"), "mm", lines, boxes, false));

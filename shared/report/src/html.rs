@@ -142,9 +142,10 @@ fn cards(report: &RunReport) -> String {
         let findings: String =
             variant.findings.iter().map(|finding| format!("<p class=finding>{}</p>", escape(finding))).collect();
         out += &format!(
-            "<article class=card><h3><i class=swatch data-color={i}></i>{}<span class=\"pill {}\">{}</span></h3>\
+            "<article class=card><h3><i class=swatch data-color=\"{}\"></i>{}<span class=\"pill {}\">{}</span></h3>\
              <p class=big>{}<small>N</small></p><p class=note>mean force of each force segment's last second</p>\
              <p>{ended}</p>{findings}</article>",
+            i % 7,
             escape(&variant.name),
             class(variant.verdict),
             verdict(variant.verdict),

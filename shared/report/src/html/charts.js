@@ -96,7 +96,6 @@ function draw() {
       hooks: { drawClear: [shaded(chart.boxes)], setScale: [zoomAll] },
     }, [chart.t, ...chart.lines.map((line) => line.y)], box));
   }
-  for (const swatch of document.querySelectorAll(".swatch")) swatch.style.background = variable("--c" + (swatch.dataset.color % 7));
 }
 
 function theme(isDark) {

@@ -252,7 +252,7 @@ fn position_limits(report: &RunReport) -> Vec<Span> {
             else {
                 continue;
             };
-            let Some(wanted) = variant.curves.desired.at(row.end_s) else { continue };
+            let Some(wanted) = variant.curves.desired.before(row.end_s) else { continue };
             let (from, until) = (row.end_s - 0.1 * (row.end_s - row.start_s), row.end_s);
             let span = Span { allowed: true, from, until, min: 1e3 * (wanted - max), max: 1e3 * (wanted + max) };
             if !boxes.contains(&span) {

@@ -170,7 +170,8 @@ impl Comparison {
             html::table(&headings, &self.rows(false)),
         );
         let names: Vec<&str> = self.runs.iter().map(|run| run.label.as_str()).collect();
-        let note = "Colour tells variants or joints apart, the stroke the runs, in their order: solid, dashed, dotted.";
+        let note = "Where every run has one line, colour tells the runs apart; elsewhere colour tells variants or joints apart, and \
+                    the stroke the runs, in their order: solid, dashed, dotted.";
         html::page("comparison of runs", &names.join(" – "), note, &self.charts(), &sections)
     }
 

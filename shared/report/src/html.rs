@@ -113,7 +113,8 @@ fn facts(report: &RunReport) -> String {
         format!("<b>{}</b>", escape(&report.pacing)),
     ];
     let simulated: f64 = report.variants.iter().map(|variant| variant.simulated_s).sum();
-    facts.push(format!("<b>{simulated:.1} s</b> simulated in {} runs", report.variants.len()));
+    let runs = report.variants.len();
+    facts.push(format!("<b>{simulated:.1} s</b> simulated in {runs} run{}", if runs == 1 { "" } else { "s" }));
     let walls: Option<Vec<f64>> = report.variants.iter().map(|variant| variant.wall_s).collect();
     if let Some(wall) = walls.map(|walls| walls.iter().sum::<f64>()).filter(|wall| *wall > 0.0) {
         facts.push(format!("<b>{:.0} ×</b> real time", simulated / wall));

@@ -85,8 +85,9 @@ fn row(segment: &ResolvedSegment, axis: usize, signals: &Signals) -> SegmentRow 
     let rms_error = |from: f64| {
         force.mean_of(from, end, |y| (y - wanted) * (y - wanted)).filter(|_| reached && force_controlled).map(f64::sqrt)
     };
+    // X_d may jump where the next segment begins
     let position_error = |of: &Series| {
-        (reached && !force_controlled).then(|| Some((of.at(end)? - signals.desired.at(end)?).abs())).flatten()
+        (reached && !force_controlled).then(|| Some((of.at(end)? - signals.desired.before(end)?).abs())).flatten()
     };
     SegmentRow {
         name: segment.name.clone(),

@@ -34,6 +34,11 @@ impl Series {
         }
     }
 
+    /// The last value before `t`: of a quantity that may jump there.
+    pub fn before(&self, t: f64) -> Option<f64> {
+        self.y.get(self.t.partition_point(|&sample| sample < t).checked_sub(1)?).copied()
+    }
+
     /// Samples from `from` to `until`, both ends interpolated.
     pub fn within(&self, from: f64, until: f64) -> impl Iterator<Item = (f64, f64)> {
         let inner = self.t.partition_point(|&t| t <= from)..self.t.partition_point(|&t| t < until);
@@ -89,6 +94,7 @@ mod tests {
         assert_eq!(ramp().at(2.0), Some(2.0));
         assert_eq!((ramp().at(-1.0), ramp().at(9.0)), (Some(0.0), Some(3.0)));
         assert_eq!(Series::default().at(0.0), None);
+        assert_eq!((ramp().before(3.0), ramp().before(3.1), ramp().before(0.0)), (Some(1.0), Some(3.0), None));
     }
 
     #[test]

@@ -54,6 +54,13 @@ for _ in 1 2 3; do
 done
 
 echo
+echo "sweep: runs a minute of a 2-s one-axis scenario (200 Hz control, 2 kHz plant), 500 runs on all cores"
+start=$(date +%s.%N)
+"$release/vmerack" sweep one-axis-delay --variant zeta-1 --set duration_s=2.0 --vary encoder_if.delay_ms=40..90:500 \
+    --measure envelope_growth --out "$out/sweep" >/dev/null 2>&1
+awk -v a="$start" -v b="$(date +%s.%N)" 'BEGIN { printf "%.0f\n", 500 * 60 / (b - a) }'
+
+echo
 echo "greatest resident size of each process, MB"
 "$release/vmerack" run table-5-3 --variant modified --set 'report.sweep=[]' --duration 60 --out "$out" --json >/dev/null 2>&1 &
 rack=$!

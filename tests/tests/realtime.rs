@@ -71,3 +71,41 @@ fn a_process_killed_or_stopped_in_real_time_ends_the_run_with_its_name() {
         bench.digest_of("out/nominal.mcap");
     }
 }
+
+#[test]
+fn a_strict_run_refuses_what_the_machine_refuses() {
+    let bench = Bench::new();
+    // no machine has this many processors
+    let scenario = bench.scenario("s.toml", &[("process.hw_sim.cpus", toml::Value::from(vec![1000]))]);
+    let outcome = bench.run(&[run(scenario, "1").as_slice(), &["--strict"]].concat());
+    outcome.expect_code(1).expect_message("processors [1000]").expect_nothing_left();
+    let outcome = bench.run(&run(scenario, "0.5")).expect_code(0);
+    outcome.expect_message("hw_sim: real time without processors [1000]").expect_nothing_left();
+}
+
+#[test]
+fn a_process_runs_on_the_processors_and_with_the_priority_that_the_scenario_gives_it() {
+    let bench = Bench::new();
+    let edits = [("process.hw_sim.cpus", toml::Value::from(vec![0])), ("process.hw_sim.priority", toml::Value::from(61))];
+    let scenario = bench.scenario("s.toml", &edits);
+    let mut running = bench.start(&run(scenario, "50"));
+    let processes = running.wait_for_processes(7);
+    running.pause(Duration::from_millis(1500));
+    let proc = |name: &str, file: &str| {
+        let pid = processes.iter().find(|process| process.name == name).expect("the process lives").pid;
+        std::fs::read_to_string(format!("/proc/{pid}/{file}")).expect("/proc")
+    };
+    assert!(proc("hw_sim", "status").contains("Cpus_allowed_list:\t0\n"));
+    let policy = |name: &str| {
+        let stat = proc(name, "stat");
+        let fields: Vec<&str> = stat.rsplit_once(')').expect("stat").1.split_whitespace().collect();
+        (fields[38].to_owned(), fields[37].to_owned())
+    };
+    if policy("da_io").0 == "1" {
+        // SCHED_FIFO is allowed here
+        assert_eq!(policy("hw_sim"), ("1".into(), "61".into()));
+        assert_eq!(policy("da_io"), ("1".into(), "50".into()));
+    }
+    signal(running.pid(), Signal::INT);
+    running.wait().expect_code(1).expect_nothing_left();
+}

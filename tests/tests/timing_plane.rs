@@ -67,7 +67,7 @@ fn run(mut scenario: Scenario, seconds: f64, spies: &[(BoardId, fn(&Inputs, &mut
             None => board,
         })
     };
-    let context = Context { prefix: String::new(), variant: "nominal".into(), record: None, scenario };
+    let context = Context { prefix: String::new(), variant: "nominal".into(), record: None, measure: false, scenario };
     let mut rack = Lockstep::power_up(context, &factory, &|_| Vec::new(), &INTERRUPTED).expect("power-up");
     rack.run(scenario::nanoseconds(seconds), &mut Windows(Arc::clone(&notes))).expect("run");
     rack.finish().expect("end");

@@ -26,6 +26,21 @@ enum Command {
     Sweep(commands::sweep::SweepArgs),
     Margin(commands::margin::MarginArgs),
     Compare(commands::compare::CompareArgs),
+    Latency(commands::latency::LatencyArgs),
+    Doctor(commands::doctor::DoctorArgs),
+    Top(commands::top::TopArgs),
+    /// Receives what `vmerack latency` sends to compare with.
+    #[command(hide = true)]
+    Receive {
+        /// How it comes.
+        means: String,
+        /// Prefix in shared memory.
+        prefix: String,
+        /// Folder.
+        folder: std::path::PathBuf,
+        /// SCHED_FIFO priority.
+        priority: u8,
+    },
     /// Hosts the boards of one process; `vmerack run` starts it.
     #[command(hide = true)]
     Host {
@@ -57,6 +72,10 @@ pub fn main() -> ExitCode {
         Command::Sweep(args) => commands::sweep::run(args),
         Command::Margin(args) => commands::margin::run(args),
         Command::Compare(args) => commands::compare::run(args),
+        Command::Latency(args) => commands::latency::run(args),
+        Command::Doctor(args) => commands::doctor::run(args),
+        Command::Top(args) => commands::top::run(args),
+        Command::Receive { means, prefix, folder, priority } => commands::latency::receive(&means, &prefix, &folder, priority),
         Command::Host { .. } => Ok(0),
     };
     match outcome {

@@ -10,5 +10,7 @@
 pub mod boards;
 pub mod cli;
 pub mod commands;
+mod machine;
 pub mod parallel;
 pub mod rack_run;
+mod status;

@@ -1,10 +1,12 @@
 //! One variant of a scenario, from power-up to the last window, and what it comes to.
 
 use crate::boards;
+use crate::status::{self, Shown, Status};
 use board::{Mail, Ns};
 use clap::ValueEnum;
-use messages::{EventKind, drive_status};
-use pacing::{Context, Flow, Lockstep, Measured, Observer, Realtime, RunError};
+use messages::{EventKind, Severity, Span, drive_status};
+use pacing::{Context, Flow, Lockstep, Observer, Realtime, RunError};
+use report::latency::{Clock, Journal, Measurement};
 use report::{Accounting, BusAccount, Ended, Ledger, Trace, VariantResult};
 use scenario::{Process, Scenario, Variant};
 use std::path::PathBuf;
@@ -26,6 +28,15 @@ pub enum Pacing {
     Realtime,
 }
 
+impl Pacing {
+    fn name(self) -> &'static str {
+        match self {
+            Pacing::Lockstep => "lock step",
+            Pacing::Realtime => "real time",
+        }
+    }
+}
+
 /// What a run needs to know beside its scenario.
 #[derive(Clone, Debug, Default)]
 pub struct Setting {
@@ -35,7 +46,12 @@ pub struct Setting {
     pub in_process: bool,
     /// Record to write; none = recording off.
     pub record: Option<PathBuf>,
+    /// Measure in simulated time; real time measures anyhow, unless the scenario says otherwise.
+    pub measure: bool,
 }
+
+/// Events of severity error that a watcher sees.
+const FAULTS: usize = 8;
 
 /// What a run came to.
 pub struct Finished {
@@ -49,6 +65,8 @@ pub struct Finished {
     pub start_up: Duration,
     /// Wall time of the windows.
     pub windows: Duration,
+    /// What was measured, where anything was.
+    pub measurement: Option<Measurement>,
 }
 
 /// Runs one variant's scenario to its end, or as far as it goes. `progress` hears the simulated time.
@@ -64,17 +82,23 @@ pub fn run(
         trace: Trace::with_capacity((scenario.duration() * 250.0) as usize),
         ledger: Ledger::new(scenario),
         accounting: Accounting::new(scenario).map_err(|error| error.to_string())?,
+        journal: None,
+        shown: None,
+        status: Status {
+            pid: std::process::id(),
+            run: format!("{}, variant {}", scenario.title, variant.name),
+            pacing: setting.pacing.name().into(),
+            ..Status::default()
+        },
         reached: 0,
         diverged: false,
         record_lost: false,
+        windows: 0,
         start_up: Duration::ZERO,
         start,
         progress,
     };
-    let (measured, error) = match carry_out(scenario, variant, setting, &mut witness) {
-        Ok(measured) => (measured, None),
-        Err(error) => (Vec::new(), Some(error)),
-    };
+    let error = carry_out(scenario, variant, setting, &mut witness).err();
     let windows = start.elapsed().saturating_sub(witness.start_up);
     let at_s = witness.reached as f64 * 1e-9;
     let ended = match &error {
@@ -83,13 +107,12 @@ pub fn run(
         None => Ended::Completed,
     };
     let mut result = VariantResult::new(scenario, variant, &witness.trace, &witness.ledger, ended, at_s)?;
-    for path in measured.into_iter().filter(|path| path.n > 0) {
-        let Measured { path, n, late, min_ns, p50_ns, p99_ns, max_ns } = path;
-        let path = if late > 0 { format!("{path} ({late} late)") } else { path };
-        result.measured.push(report::PathLatency { path, n, min_ns, p50_ns, p99_ns, max_ns });
+    let measurement = witness.journal.map(Journal::finish);
+    if let Some(measurement) = measurement.as_ref().filter(|_| setting.pacing == Pacing::Realtime) {
+        result.measured.clone_from(&measurement.rows);
     }
     result.wall_s = Some(windows.as_secs_f64());
-    Ok(Finished { result, error, record_lost: witness.record_lost, start_up: witness.start_up, windows })
+    Ok(Finished { result, error, record_lost: witness.record_lost, start_up: witness.start_up, windows, measurement })
 }
 
 fn carry_out(
@@ -97,30 +120,38 @@ fn carry_out(
     variant: &Variant,
     setting: &Setting,
     witness: &mut Witness<'_>,
-) -> Result<Vec<Measured>, RunError> {
+) -> Result<(), RunError> {
     let mut scenario = scenario.clone();
     if setting.in_process {
         scenario.processes = vec![everything_in_the_chassis()];
     }
     let end = scenario.duration_ns();
-    let context = Context { prefix: String::new(), variant: variant.name.clone(), record: setting.record.clone(), scenario };
+    let measure = match setting.pacing {
+        Pacing::Lockstep => setting.measure,
+        Pacing::Realtime => scenario.realtime.measure,
+    };
+    let (variant, record) = (variant.name.clone(), setting.record.clone());
+    let context = Context { prefix: String::new(), variant, record, measure, scenario };
     match setting.pacing {
         Pacing::Lockstep => {
             let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
             witness.start_up = witness.start.elapsed();
-            let ran = rack.run(end, witness);
-            witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
-            ran?;
-            rack.finish()?;
-            Ok(Vec::new())
-        }
-        Pacing::Realtime => {
-            let mut rack = Realtime::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
-            witness.start_up = witness.start.elapsed();
+            witness.journal = measure.then(|| Journal::new(Clock::Simulated, 0));
+            witness.shown = rack.folder().map(Shown::new);
             let ran = rack.run(end, witness);
             witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
             ran?;
             rack.finish()
+        }
+        Pacing::Realtime => {
+            let mut rack = Realtime::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
+            witness.start_up = witness.start.elapsed();
+            witness.journal = measure.then(|| Journal::new(Clock::Wall, rack.zero()));
+            witness.shown = rack.folder().map(Shown::new);
+            let ran = rack.run(end, witness);
+            witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
+            ran?;
+            rack.finish(witness)
         }
     }
 }
@@ -161,7 +192,7 @@ impl Observer for Listener {
 /// The process list of a run inside this process.
 pub fn everything_in_the_chassis() -> Process {
     let boards = messages::BOARDS[1..].iter().map(|board| board.name().to_owned()).collect();
-    Process { name: messages::BOARDS[0].name().to_owned(), boards, command: Vec::new() }
+    Process { name: messages::BOARDS[0].name().to_owned(), boards, ..Process::default() }
 }
 
 /// Collects what a run is measured by, and ends it when the plant has left its domain.
@@ -169,12 +200,49 @@ struct Witness<'a> {
     trace: Trace,
     ledger: Ledger,
     accounting: Accounting,
+    journal: Option<Journal>,
+    /// Where somebody may watch.
+    shown: Option<Shown>,
+    status: Status,
     reached: Ns,
     diverged: bool,
     record_lost: bool,
+    windows: u64,
     start_up: Duration,
     start: Instant,
     progress: &'a mut dyn FnMut(Ns),
+}
+
+impl Witness<'_> {
+    /// Keeps the status for whoever watches.
+    fn show(&mut self, until: Ns, mail: &Mail) {
+        let status = &mut self.status;
+        if let Some(probe) = mail.control_probe.last() {
+            status.state = safety_state(probe.state).into();
+        }
+        for event in mail.events.iter().filter(|event| event.severity == Severity::Error as u32) {
+            let name = EventKind::from_number(event.kind).map_or("unknown", EventKind::name);
+            status.faults.truncate(FAULTS - 1);
+            status.faults.insert(0, format!("{name} at {:.4} s", event.t as f64 * 1e-9));
+        }
+        // a look at the clock a few times a millisecond of simulated time is enough
+        self.windows += 1;
+        let often = if self.journal.is_some() { 16 } else { 256 };
+        let Some(shown) = self.shown.as_mut().filter(|_| self.windows % often == 0) else { return };
+        if shown.due() {
+            status.simulated_s = until as f64 * 1e-9;
+            status.wall_s = self.start.elapsed().saturating_sub(self.start_up).as_secs_f64();
+            if let Some(journal) = &self.journal {
+                status.rows = status::rows(journal, status.wall_s);
+            }
+            shown.write(status);
+        }
+    }
+}
+
+/// Safety state as people call it.
+fn safety_state(number: u32) -> &'static str {
+    ["run", "degraded", "SS2 hold", "SS1 stop", "STO"].get(number as usize).copied().unwrap_or("unknown")
 }
 
 impl Observer for Witness<'_> {
@@ -187,6 +255,13 @@ impl Observer for Witness<'_> {
         self.record_lost |= mail.events.iter().any(|event| event.kind == EventKind::RecordLost as u32);
         self.diverged |= mail.plant_probe.iter().any(|probe| probe.status & drive_status::DIVERGED != 0);
         (self.progress)(until);
+        self.show(until, mail);
         if self.diverged { Flow::Stop } else { Flow::Continue }
+    }
+
+    fn measured(&mut self, spans: &[Span], lost: u32) {
+        if let Some(journal) = &mut self.journal {
+            journal.take(spans, lost);
+        }
     }
 }

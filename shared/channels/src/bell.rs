@@ -73,6 +73,16 @@ impl Bells {
         self.word(0, ROUND_WORD).store(round, Ordering::SeqCst);
     }
 
+    /// Puts 32-bit words where bells from `first` on would be; there must be room.
+    pub(crate) fn put(&self, first: usize, words: &[u32]) {
+        words.iter().enumerate().for_each(|(i, word)| self.word(first, i).store(*word, Ordering::Relaxed));
+    }
+
+    /// Takes them from there.
+    pub(crate) fn get(&self, first: usize, words: &mut [u32]) {
+        words.iter_mut().enumerate().for_each(|(i, word)| *word = self.word(first, i).load(Ordering::Relaxed));
+    }
+
     /// Rings the bell of process `index`.
     pub fn ring(&self, index: usize) {
         self.ring_times(index, 1);
@@ -120,7 +130,8 @@ impl Bell {
         self.block(limit)
     }
 
-    fn block(&mut self, limit: Duration) -> u32 {
+    /// Waits as [`Bell::wait`] does, but blocks at once.
+    pub(crate) fn block(&mut self, limit: Duration) -> u32 {
         let (counter, sleeping) = (self.bells.word(self.index, 0), self.bells.word(self.index, 1));
         let timeout =
             rustix::thread::futex::Timespec { tv_sec: limit.as_secs() as _, tv_nsec: limit.subsec_nanos().into() };

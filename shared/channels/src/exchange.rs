@@ -1,7 +1,6 @@
 //! The mail of one process: what its boards send goes to the boards beside them and to other processes.
 
-use crate::transport::{Transport, wall_ns};
-use crate::{ChannelError, Domain, Port, Sender};
+use crate::{ChannelError, Domain, Port, Sender, wall_ns};
 use board::routes::{ROUTES, Route};
 use board::{BoardId, Mail};
 use messages::*;
@@ -19,23 +18,26 @@ const LENGTH: usize = 64;
 #[derive(Default)]
 pub struct Exchange {
     local: Vec<(Route, Vec<BoardId>)>,
-    outlets: Vec<(BoardId, Box<dyn Outlet>)>,
-    inlets: Vec<Box<dyn Inlet>>,
-    measured: bool,
+    /// By index of their route.
+    outlets: Vec<(usize, Box<dyn Outlet>)>,
+    inlets: Vec<(usize, Box<dyn Inlet>)>,
+    /// Messages taken in since they were last asked for, where transport is measured.
+    hops: Option<Vec<Span>>,
 }
 
 trait Outlet {
     /// `stamped`: the header says when on the wall clock.
     fn send(&mut self, mail: &Mail, stamped: bool) -> Result<(), ChannelError>;
+    /// Messages sent so far.
+    fn sent(&self) -> u32;
     /// The reader in that process is gone for good.
     fn forget(&mut self, board: BoardId);
 }
 
 trait Inlet {
     fn readers(&self) -> &[BoardId];
-    fn receive(&mut self, stepped_to: Ns, inboxes: &mut Inboxes) -> Result<(), ChannelError>;
-    fn measure(&mut self);
-    fn transport(&self) -> Option<&Transport>;
+    /// `arrived` hears each message's header.
+    fn receive(&mut self, inboxes: &mut Inboxes, arrived: &mut dyn FnMut(&Header)) -> Result<(), ChannelError>;
 }
 
 /// A kind of payload: where it lies in a [`Mail`].
@@ -102,6 +104,10 @@ impl<T: Payload> Outlet for TypedOutlet<T> {
         Ok(())
     }
 
+    fn sent(&self) -> u32 {
+        self.seq
+    }
+
     fn forget(&mut self, board: BoardId) {
         if let Some(i) = self.readers.iter().position(|reader| *reader == board) {
             self.readers.remove(i);
@@ -114,12 +120,11 @@ struct TypedInlet<T: Payload> {
     port: Port<T, Header>,
     expected: u32,
     readers: Vec<BoardId>,
-    transport: Option<Transport>,
 }
 
 impl<T: Payload> TypedInlet<T> {
     fn open(domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize) -> Result<Self, ChannelError> {
-        Ok(TypedInlet { port: Port::open(domain, name, processes, BUFFER)?, expected: 0, readers, transport: None })
+        Ok(TypedInlet { port: Port::open(domain, name, processes, BUFFER)?, expected: 0, readers })
     }
 }
 
@@ -128,21 +133,11 @@ impl<T: Payload> Inlet for TypedInlet<T> {
         &self.readers
     }
 
-    fn measure(&mut self) {
-        self.transport = Some(Transport::new(self.port.name()));
-    }
-
-    fn transport(&self) -> Option<&Transport> {
-        self.transport.as_ref()
-    }
-
-    fn receive(&mut self, stepped_to: Ns, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
-        let Self { port, expected, readers, transport } = self;
+    fn receive(&mut self, inboxes: &mut Inboxes, arrived: &mut dyn FnMut(&Header)) -> Result<(), ChannelError> {
+        let Self { port, expected, readers } = self;
         let mut gap = None;
         while port.receive(|header, payload| {
-            if let Some(transport) = transport {
-                transport.arrived(header, stepped_to);
-            }
+            arrived(header);
             if header.seq != *expected {
                 gap = Some((*expected, header.seq));
             }
@@ -182,7 +177,7 @@ impl Exchange {
         process_of: impl Fn(BoardId) -> usize,
     ) -> Result<Exchange, ChannelError> {
         let mut exchange = Exchange::default();
-        for route in ROUTES {
+        for (index, route) in ROUTES.iter().enumerate() {
             let readers: Vec<BoardId> = route.to.iter().copied().filter(|reader| here.contains(reader)).collect();
             let away: Vec<BoardId> =
                 route.to.iter().copied().filter(|reader| process_of(*reader) != process_of(route.from)).collect();
@@ -195,13 +190,13 @@ impl Exchange {
                     // one reader board stands for each process
                     let mut ends = away.clone();
                     ends.dedup_by_key(|board| process_of(*board));
-                    exchange.outlets.push((route.from, open_outlet(route.kind, domain, &name, ends, processes.len())?));
+                    exchange.outlets.push((index, open_outlet(route.kind, domain, &name, ends, processes.len())?));
                 }
                 if !readers.is_empty() {
                     exchange.local.push((*route, readers));
                 }
             } else if let (Some(domain), false) = (domain, readers.is_empty()) {
-                exchange.inlets.push(open_inlet(route.kind, domain, &name, readers, processes.len())?);
+                exchange.inlets.push((index, open_inlet(route.kind, domain, &name, readers, processes.len())?));
             }
         }
         Ok(exchange)
@@ -214,28 +209,51 @@ impl Exchange {
                 copy(route.kind, mail, &mut inboxes[*reader as usize]);
             }
         }
-        self.outlets
-            .iter_mut()
-            .filter(|(sender, _)| *sender == from)
-            .try_for_each(|(_, outlet)| outlet.send(mail, self.measured))
+        let stamped = self.hops.is_some();
+        let mut outlets = self.outlets.iter_mut().filter(|(route, _)| ROUTES[*route].from == from);
+        outlets.try_for_each(|(_, outlet)| outlet.send(mail, stamped))
     }
 
     /// Takes in what other processes sent to `to`, which has acted up to `stepped_to`: where transport is measured, what
     /// is not newer than that has come late.
     pub fn fetch(&mut self, to: BoardId, stepped_to: Ns, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
-        let mut inlets = self.inlets.iter_mut().filter(|inlet| inlet.readers().contains(&to));
-        inlets.try_for_each(|inlet| inlet.receive(stepped_to, inboxes))
+        let Self { inlets, hops, .. } = self;
+        for (route, inlet) in inlets.iter_mut().filter(|(_, inlet)| inlet.readers().contains(&to)) {
+            inlet.receive(inboxes, &mut |header| {
+                if let Some(hops) = hops {
+                    hops.push(Span {
+                        t: header.t,
+                        begin: header.wall_ns,
+                        end: wall_ns(),
+                        number: header.seq.into(),
+                        channel: *route as u32,
+                        // time 0: content whose time only the bus decides
+                        late: (header.t != 0 && header.t <= stepped_to).into(),
+                        ..Span::new(SpanKind::Hop, to)
+                    });
+                }
+            })?;
+        }
+        Ok(())
     }
 
     /// From now on messages say when they were sent on the wall clock, and arrivals are measured.
     pub fn measure(&mut self) {
-        self.measured = true;
-        self.inlets.iter_mut().for_each(|inlet| inlet.measure());
+        self.hops.get_or_insert_with(|| Vec::with_capacity(BUFFER));
     }
 
-    /// What has been measured, a channel each.
-    pub fn transports(&self) -> impl Iterator<Item = &Transport> {
-        self.inlets.iter().filter_map(|inlet| inlet.transport())
+    /// The messages that have come in since this was last asked for.
+    pub fn hops(&mut self) -> impl Iterator<Item = Span> {
+        self.hops.iter_mut().flat_map(|hops| hops.drain(..))
+    }
+
+    /// How many messages have been sent to other processes, a channel each.
+    pub fn sent(&self) -> impl Iterator<Item = Span> {
+        self.outlets.iter().map(|(route, outlet)| Span {
+            number: outlet.sent().into(),
+            channel: *route as u32,
+            ..Span::new(SpanKind::Sent, ROUTES[*route].from)
+        })
     }
 
     /// The process of `board` is gone for good: messages need not reach it any more.
@@ -279,6 +297,7 @@ mod tests {
             a.deliver(DaIo, &mail_with_command(), &mut at_a).expect("deliver");
             b.fetch(HwSim, 0, &mut at_b).expect("fetch");
             assert_eq!(at_b[HwSim as usize].amplifier, mail_with_command().amplifier);
+            assert_eq!(b.hops().count(), 0, "nothing is measured unasked");
             let mut mail = Mail::default();
             // one message more than fits a sample's preallocated length
             mail.plant.resize(LENGTH + 1, bytemuck::Zeroable::zeroed());
@@ -287,6 +306,34 @@ mod tests {
             assert_eq!(at_a[EncoderIf as usize].plant.len(), LENGTH + 1);
             assert_eq!(at_a[DaIo as usize].plant.len(), LENGTH + 1);
             assert_eq!(at_b[ForceSensorIf as usize].plant.len(), LENGTH + 1);
+        }
+        assert!(crate::remove_leftovers(&prefix).is_empty());
+    }
+
+    #[test]
+    fn what_comes_for_a_time_that_its_reader_has_passed_is_late() {
+        let folder = tempfile::tempdir().expect("folder");
+        let prefix = format!("l{}x_", std::process::id());
+        let process_of = |board: BoardId| usize::from(board == DaIo);
+        {
+            let domain = Domain::join(folder.path(), &prefix, "a").expect("domain");
+            let mut a = Exchange::open(&[DaIo], Some(&domain), process_of).expect("open");
+            let mut b = Exchange::open(&[HwSim], Some(&domain), process_of).expect("open");
+            let mut inboxes = Inboxes::default();
+            a.measure();
+            b.measure();
+            // the command is of time 7
+            for (stepped_to, late, seq) in [(6, 0, 0), (7, 1, 1), (8, 1, 2)] {
+                let before = wall_ns();
+                a.deliver(DaIo, &mail_with_command(), &mut inboxes).expect("deliver");
+                b.fetch(HwSim, stepped_to, &mut inboxes).expect("fetch");
+                let hops: Vec<Span> = b.hops().collect();
+                assert_eq!(hops.len(), 1);
+                assert_eq!((hops[0].late, hops[0].number, hops[0].t), (late, seq, 7));
+                assert!(before <= hops[0].begin && hops[0].begin <= hops[0].end);
+            }
+            let sent: Vec<Span> = a.sent().filter(|span| ROUTES[span.channel as usize].kind == Kind::Amplifier).collect();
+            assert_eq!(sent[0].number, 3);
         }
         assert!(crate::remove_leftovers(&prefix).is_empty());
     }

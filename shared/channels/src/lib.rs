@@ -3,24 +3,26 @@
 //! * [`Domain`]: one iceoryx2 domain per run, with its own prefix and folder; two runs never meet.
 //! * [`Exchange`]: the mail of one process's boards, over [`board::routes`].
 //! * [`Port`], [`Sender`]: one typed channel.
-//! * [`Transport`]: what the wall clock says about a channel.
+//! * [`wall_ns`]: the clock of all measuring.
+//! * [`baseline`]: what the machine's own means take, for comparison.
 //! * [`Bell`]: wakes a process up; a word in shared memory and a futex.
 //!
 //! Every failure is a [`ChannelError`] that names the channel; nothing here waits without a limit.
 
 #![warn(missing_docs)]
 
+pub mod baseline;
 mod bell;
+mod clock;
 mod domain;
 mod error;
 mod exchange;
 mod pod;
 mod port;
-mod transport;
 
 pub use bell::{Bell, Bells};
+pub use clock::{sleep_until, wall_ns};
 pub use domain::{Domain, remove_leftovers};
 pub use error::ChannelError;
 pub use exchange::{Exchange, Inboxes};
 pub use port::{Port, Sender};
-pub use transport::{Transport, histogram, wall_ns};

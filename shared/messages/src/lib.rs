@@ -13,6 +13,7 @@ mod grant;
 mod header;
 mod plant;
 pub mod registers;
+mod span;
 mod telemetry;
 
 pub use board_id::{BOARDS, BoardId};
@@ -23,6 +24,7 @@ pub use event::{Event, EventKind, Severity};
 pub use grant::{Grant, NOBODY, OpRecord, Reply, flags};
 pub use header::{Header, Kind};
 pub use plant::{AmplifierCommand, PlantProbe, PlantSample, drive_status};
+pub use span::{Span, SpanKind};
 pub use telemetry::Telemetry;
 pub use vme::Ns;
 

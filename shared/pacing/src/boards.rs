@@ -7,10 +7,10 @@ use crate::error::at;
 use crate::host::{Answer, Factory, Host};
 use crate::remote::{READY, Remote};
 use crate::serve::{CHASSIS_BELL, process_of};
-use crate::{Context, Power, RunError, RunFolder};
+use crate::{Context, Observer, Power, RunError, RunFolder};
 use board::{BoardId, Ns, Op};
 use channels::{Bell, Bells, Domain, Exchange};
-use messages::{BOARDS, Grant, NOBODY, TransferRecord, flags};
+use messages::{BOARDS, Grant, NOBODY, Span, TransferRecord, flags};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use vme::{Log, Origin, Timing, Transfer};
@@ -45,6 +45,8 @@ pub(crate) struct Boards {
     pub window: u64,
     /// Simulated time reached.
     pub reached: Ns,
+    /// What has been measured and not been shown to the observer, where anything is.
+    pub spans: Option<Vec<Span>>,
     /// Grants that the recorder has not answered yet, and those of them that it has not been woken for.
     pub recorder_owes: u32,
     recorder_sleeps: u32,
@@ -89,14 +91,17 @@ impl Boards {
             let joined = Domain::join(&run_folder.path, &run_folder.prefix, "chassis")?;
             let page = Bells::open(&run_folder.path.join("bells"), scenario.processes.len() + 1)?;
             for i in &away {
-                remotes.push(Remote::open(&joined, &scenario.processes[*i].name, i + 1)?);
+                remotes.push(Remote::open(&joined, &scenario.processes[*i].name, i + 1, context.measure)?);
             }
             bells = Some((page.clone(), page.bell(CHASSIS_BELL)));
             domain = Some(joined);
             folder = Some(run_folder);
         }
         let exchange = Exchange::open(&here, domain.as_ref(), |board| place[board as usize])?;
-        let host = Host::new(&here, exchange, &context, factory)?;
+        let mut host = Host::new(&here, exchange, &context, factory)?;
+        if context.measure {
+            host.measure(false);
+        }
         let processor = folder.as_ref().and_then(|_| OneProcessor::stay());
         if let Some(folder) = &folder {
             for i in &away {
@@ -122,6 +127,7 @@ impl Boards {
             transfers: Default::default(),
             window: 0,
             reached: 0,
+            spans: context.measure.then(Vec::new),
             recorder_owes: 0,
             recorder_sleeps: 0,
             // in a process with others, its grants must not stand in theirs' way
@@ -142,6 +148,21 @@ impl Boards {
             }
         }
         Ok((boards, timing))
+    }
+
+    /// Shows the observer what has been measured.
+    pub fn show_spans(&mut self, observer: &mut dyn Observer) -> Result<(), RunError> {
+        let Some(spans) = &mut self.spans else { return Ok(()) };
+        self.host.take_spans([], spans);
+        let mut lost = 0;
+        for remote in &mut self.remotes {
+            lost += remote.spans(spans)?;
+        }
+        if !spans.is_empty() || lost > 0 {
+            observer.measured(spans, lost);
+            spans.clear();
+        }
+        Ok(())
     }
 
     /// The longest job of each task that its board has asked for so far.

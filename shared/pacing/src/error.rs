@@ -70,6 +70,12 @@ pub enum RunError {
         /// What the operating system says.
         reason: String,
     },
+    /// The scenario is strict, and the machine refuses what real time needs.
+    #[error("real time without {what}: refused, since --strict (realtime.strict) asks for all of it")]
+    Refused {
+        /// What, each with its remedy.
+        what: String,
+    },
     /// The user interrupted the run.
     #[error("interrupted, {when}")]
     Interrupted {

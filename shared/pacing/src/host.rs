@@ -1,10 +1,12 @@
 //! The boards of one process and their mail.
 
+use crate::acts::Acts;
 use crate::holdback::take_before;
 use crate::{Context, RunError};
+use board::routes::ROUTES;
 use board::{Board, BoardId, Decision, Inputs, Mail, Ns, Op, Outputs};
-use channels::{Exchange, Inboxes};
-use messages::{Grant, TransferRecord, flags};
+use channels::{Exchange, Inboxes, wall_ns};
+use messages::{Grant, Kind, Span, TransferRecord, flags};
 
 /// Builds the board of that role.
 pub type Factory<'a> = &'a dyn Fn(BoardId, &Context) -> Result<Box<dyn Board>, String>;
@@ -34,6 +36,8 @@ pub struct Host {
     inboxes: Box<Inboxes>,
     inputs: Inputs,
     outputs: Outputs,
+    /// What is measured, where anything is, and whether on the wall clock.
+    measured: Option<(Acts, bool)>,
 }
 
 impl Host {
@@ -52,7 +56,8 @@ impl Host {
                 Err(reason) => Err(RunError::Board { board: id.name(), reason }),
             })
             .collect::<Result<_, _>>()?;
-        Ok(Host { boards, exchange, inboxes: Box::default(), inputs: Inputs::default(), outputs: Outputs::default() })
+        let (inputs, outputs) = Default::default();
+        Ok(Host { boards, exchange, inboxes: Box::default(), inputs, outputs, measured: None })
     }
 
     /// Takes in the mail of the board that the grant names and steps it.
@@ -66,12 +71,36 @@ impl Host {
     /// Takes in the mail of a board that has acted up to `stepped_to`.
     pub(crate) fn fetch(&mut self, board: BoardId, stepped_to: Ns) -> Result<&mut Mail, RunError> {
         self.exchange.fetch(board, stepped_to, &mut self.inboxes)?;
+        if let Some((acts, true)) = &mut self.measured {
+            for hop in self.exchange.hops() {
+                if ROUTES[hop.channel as usize].kind == Kind::Plant {
+                    acts.shown(hop.t, hop.begin);
+                }
+                acts.spans.push(hop);
+            }
+        }
         Ok(&mut self.inboxes[board as usize])
     }
 
-    /// The channels of this process.
-    pub(crate) fn exchange(&mut self) -> &mut Exchange {
-        &mut self.exchange
+    /// From now on what the boards do is measured, on the wall clock or in simulated time alone.
+    pub(crate) fn measure(&mut self, on_the_wall_clock: bool) {
+        self.measured = Some((Acts::default(), on_the_wall_clock));
+        if on_the_wall_clock {
+            self.exchange.measure();
+        }
+    }
+
+    /// Adds to what has been measured, and takes all of it.
+    pub(crate) fn take_spans(&mut self, more: impl IntoIterator<Item = Span>, into: &mut Vec<Span>) {
+        if let Some((acts, _)) = &mut self.measured {
+            into.append(&mut acts.spans);
+            into.extend(more);
+        }
+    }
+
+    /// How many messages this process has sent, a channel each.
+    pub(crate) fn sent(&self) -> impl Iterator<Item = Span> {
+        self.exchange.sent()
     }
 
     /// Steps the board that the grant names with the mail taken in.
@@ -101,11 +130,17 @@ impl Host {
             std::mem::swap(&mut inputs.mail, inbox);
         }
         self.outputs.clear();
+        let clock = |measured: &Option<(Acts, bool)>| if let Some((_, true)) = measured { wall_ns() } else { 0 };
+        let begin = clock(&self.measured);
         if let Some((_, board)) = self.boards.iter_mut().find(|(known, _)| *known == id) {
             board.step(grant.until, &self.inputs, &mut self.outputs);
         }
-        self.inputs.mail.clear();
         self.exchange.deliver(id, &self.outputs.mail, &mut self.inboxes)?;
+        let end = clock(&self.measured);
+        if let Some((acts, _)) = &mut self.measured {
+            acts.stepped(id, grant, &self.inputs, &self.outputs, begin, end);
+        }
+        self.inputs.mail.clear();
         Ok(Answer { early: self.outputs.early, rest: self.outputs.rest.take(), program: self.outputs.program.take() })
     }
 

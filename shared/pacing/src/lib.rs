@@ -11,6 +11,7 @@
 
 #![warn(missing_docs)]
 
+mod acts;
 mod affinity;
 mod boards;
 mod error;
@@ -27,6 +28,6 @@ pub use error::RunError;
 pub use host::{Answer, Factory, Host};
 pub use lockstep::{Flow, Lockstep, Observer};
 pub use power::Power;
-pub use realtime::{Measured, Realtime};
-pub use run_folder::{Context, RunFolder, clean_stale};
+pub use realtime::{Realtime, ask_for_rights};
+pub use run_folder::{Context, RunFolder, clean_stale, live_runs, stale_runs};
 pub use serve::serve;

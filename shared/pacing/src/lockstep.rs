@@ -10,7 +10,7 @@ use crate::error::at;
 use crate::host::Factory;
 use crate::{Context, RunError};
 use board::{BoardId, Mail, Ns, Op};
-use messages::{BOARDS, Event, EventKind, Grant, Severity, TransferRecord, flags};
+use messages::{BOARDS, Event, EventKind, Grant, Severity, Span, TransferRecord, flags};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use vme::{Log, Stop, Timing};
@@ -35,6 +35,10 @@ pub enum Flow {
 pub trait Observer {
     /// Probes and events of the window's boards, and what happened on the bus and the processors in it.
     fn window(&mut self, until: Ns, mail: &Mail, log: &Log) -> Flow;
+
+    /// What has been measured since the last call, and how many messages of measurements were lost; only called where
+    /// [`Context::measure`] asks for it.
+    fn measured(&mut self, _spans: &[Span], _lost: u32) {}
 }
 
 /// A rack in lock step.
@@ -110,6 +114,7 @@ impl Lockstep {
                 Flow::Continue => flow,
             };
             mail.clear();
+            self.boards.show_spans(observer)?;
             if flow == Flow::Stop {
                 break;
             }

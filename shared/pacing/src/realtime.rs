@@ -6,24 +6,21 @@
 //! [`LEAD`] stages before it is due, then with what its tasks did last. A process that ends or stalls is a [`RunError`]
 //! within a bounded wall time.
 
-mod measured;
 mod paced;
 mod plan;
 mod rights;
 mod writes;
 
-pub use measured::Measured;
-pub(crate) use measured::write as write_measured;
-pub(crate) use paced::{Paced, sleep_until};
-pub(crate) use rights::ask as ask_for_rights;
+pub(crate) use paced::Paced;
+pub use rights::ask as ask_for_rights;
 
 use crate::boards::{Boards, STALL, WATCH_PERIOD, program_transfers};
 use crate::error::at;
 use crate::host::{Answer, Factory};
 use crate::{Context, Flow, Observer, RunError};
 use board::{BoardId, Mail, Ns};
-use channels::wall_ns;
-use messages::{BOARDS, Event, EventKind, Grant, Severity, TransferRecord, flags};
+use channels::{sleep_until, wall_ns};
+use messages::{BOARDS, Event, EventKind, Grant, Severity, Span, TransferRecord, flags};
 use paced::{stage, stage_ns};
 use plan::{Draft, Plan};
 use std::collections::VecDeque;
@@ -73,15 +70,22 @@ impl Realtime {
     ) -> Result<Realtime, RunError> {
         let scenario = context.scenario.clone();
         let (mut boards, timing) = Boards::power_up(context, factory, programs, interrupted)?;
-        for refused in ask_for_rights(&scenario.realtime) {
-            eprintln!("real time without {refused}; the run goes on");
-        }
         if let Some(processor) = boards.processor_kept.take() {
             // boards that run side by side want every processor
             boards.power.pids().for_each(|(_, pid)| processor.release(pid));
         }
+        let own = scenario.processes.iter().find(|process| process.name == BoardId::Chassis.name());
+        let refused = ask_for_rights(&scenario.realtime, own);
+        if scenario.realtime.strict && !refused.is_empty() {
+            return Err(RunError::Refused { what: refused.join("; ") });
+        }
+        for refused in refused {
+            eprintln!("real time without {refused}; the run goes on");
+        }
         let zero = wall_ns() + START_UP;
-        boards.host.exchange().measure();
+        if boards.spans.is_some() {
+            boards.host.measure(true);
+        }
         let start = Grant { from: zero, flags: flags::START, ..boards.grant_of(BoardId::Chassis, 0, 0, 0) };
         for remote in 0..boards.remotes.len() {
             boards.remotes[remote].grant(&start, &[])?;
@@ -100,6 +104,16 @@ impl Realtime {
             watched: Instant::now(),
             own_mail: Mail::default(),
         })
+    }
+
+    /// Folder of the run, where it has one.
+    pub fn folder(&self) -> Option<&std::path::Path> {
+        self.boards.folder.as_ref().map(|folder| folder.path.as_path())
+    }
+
+    /// When simulated time 0 is on the wall clock, CLOCK_MONOTONIC, ns.
+    pub fn zero(&self) -> u64 {
+        self.zero
     }
 
     /// Process numbers of the run.
@@ -160,8 +174,8 @@ impl Realtime {
         Ok(())
     }
 
-    /// Ends the run: the recorder closes its file, the processes leave. What was measured on the wall clock.
-    pub fn finish(mut self) -> Result<Vec<Measured>, RunError> {
+    /// Ends the run: the recorder closes its file, the processes leave; `observer` gets what was measured last.
+    pub fn finish(mut self, observer: &mut dyn Observer) -> Result<(), RunError> {
         let now = self.boards.reached;
         for board in &BOARDS[1..] {
             let grant = Grant { window: self.boards.window, ..self.boards.grant_of(*board, now, now, flags::FINISH) };
@@ -170,16 +184,17 @@ impl Realtime {
         while self.local.due().is_some() || self.debts.iter().any(|debt| debt.grants > 0) {
             self.take_answers()?;
             self.step_here()?;
+            self.boards.show_spans(observer)?;
             self.watch()?;
             self.rest_until(wall_ns() + MILLISECOND);
         }
-        let mut measured = self.local.measured(&mut self.boards.host);
-        for remote in &self.boards.remotes {
-            let Some(folder) = &self.boards.folder else { break };
-            measured.extend(measured::read(&measured_file(&folder.path, &remote.process))?);
+        let sent: Vec<Span> = self.boards.host.sent().collect();
+        if let Some(spans) = &mut self.boards.spans {
+            self.boards.host.take_spans(sent, spans);
         }
+        self.boards.show_spans(observer)?;
         self.boards.power.shut_down();
-        Ok(measured)
+        Ok(())
     }
 
     /// When a window's results are there, on the wall clock.
@@ -269,7 +284,9 @@ impl Realtime {
     }
 
     fn step_here(&mut self) -> Result<(), RunError> {
-        if let Some((grant, answer)) = self.local.step(&mut self.boards.host)? {
+        let mut unmeasured = Vec::new();
+        let spans = self.boards.spans.as_mut().unwrap_or(&mut unmeasured);
+        if let Some((grant, answer)) = self.local.step(&mut self.boards.host, spans)? {
             self.answered(BOARDS[grant.board as usize], grant.window, answer)?;
         }
         Ok(())
@@ -295,6 +312,7 @@ impl Realtime {
             self.boards.reached = until;
             let flow = observer.window(until, mail, &log);
             mail.clear();
+            self.boards.show_spans(observer)?;
             if flow == Flow::Stop {
                 return Ok(Flow::Stop);
             }
@@ -326,9 +344,4 @@ impl Realtime {
         }
         Ok(())
     }
-}
-
-/// File of a process' measurements in the run folder.
-pub(crate) fn measured_file(folder: &std::path::Path, process: &str) -> std::path::PathBuf {
-    folder.join(format!("measured-{process}.toml"))
 }

@@ -5,7 +5,7 @@ use crate::error::at;
 use crate::host::Answer;
 use board::BoardId;
 use channels::{ChannelError, Domain, Port, Sender};
-use messages::{Grant, OpRecord, Reply, TransferRecord, flags};
+use messages::{Grant, Header, OpRecord, Reply, Span, TransferRecord, flags};
 use vme::{Ns, Op};
 
 /// Grants that may be under way: the recorder's credit and some.
@@ -14,6 +14,15 @@ const BUFFER: usize = 80;
 const LENGTH: usize = 64;
 /// No board has a longer program.
 const MAX_OPS: usize = 4096;
+
+/// Spans of a step: longer messages allocate once.
+const SPANS: usize = 16;
+/// Messages of measurements that the chassis may leave unread.
+const TOLD: usize = 512;
+
+fn wall_name(process: &str) -> String {
+    format!("wall/{process}")
+}
 
 fn names(process: &str) -> (String, String) {
     (format!("grant/{process}"), format!("reply/{process}"))
@@ -27,17 +36,35 @@ pub(crate) struct Remote {
     pub bell: usize,
     grants: Sender<TransferRecord, Grant>,
     replies: Port<OpRecord, Reply>,
+    /// What the process measures, and the next message's number.
+    measured: Option<(Port<Span, Header>, u32)>,
 }
 
 impl Remote {
-    pub fn open(domain: &Domain, process: &str, bell: usize) -> Result<Remote, ChannelError> {
+    pub fn open(domain: &Domain, process: &str, bell: usize, measure: bool) -> Result<Remote, ChannelError> {
         let (grant, reply) = names(process);
         Ok(Remote {
             process: process.to_owned(),
             bell,
             grants: Sender::open(domain, &grant, 1, BUFFER, LENGTH)?,
             replies: Port::open(domain, &reply, 1, BUFFER)?,
+            measured: match measure {
+                true => Some((Port::open(domain, &wall_name(process), 1, TOLD)?, 0)),
+                false => None,
+            },
         })
+    }
+
+    /// Takes what the process has measured; returns the number of messages that were lost.
+    pub fn spans(&mut self, into: &mut Vec<Span>) -> Result<u32, ChannelError> {
+        let Some((port, next)) = &mut self.measured else { return Ok(0) };
+        let mut lost = 0;
+        while port.receive(|header, spans| {
+            lost += header.seq.wrapping_sub(*next);
+            *next = header.seq.wrapping_add(1);
+            into.extend(spans);
+        })? {}
+        Ok(lost)
     }
 
     pub fn grant(&self, grant: &Grant, transfers: &[TransferRecord]) -> Result<(), RunError> {
@@ -78,6 +105,7 @@ impl Remote {
 pub(crate) struct Line {
     grants: Port<TransferRecord, Grant>,
     replies: Sender<OpRecord, Reply>,
+    measured: Option<(Sender<Span, Header>, u32)>,
     ops: Vec<OpRecord>,
 }
 
@@ -85,13 +113,29 @@ pub(crate) struct Line {
 pub(crate) const READY: u64 = u64::MAX;
 
 impl Line {
-    pub fn open(domain: &Domain, process: &str) -> Result<Line, ChannelError> {
+    pub fn open(domain: &Domain, process: &str, measure: bool) -> Result<Line, ChannelError> {
         let (grant, reply) = names(process);
         Ok(Line {
             grants: Port::open(domain, &grant, 1, BUFFER)?,
             replies: Sender::open(domain, &reply, 1, BUFFER, LENGTH)?,
+            measured: match measure {
+                true => Some((Sender::open(domain, &wall_name(process), 1, TOLD, SPANS)?, 0)),
+                false => None,
+            },
             ops: Vec::with_capacity(LENGTH),
         })
+    }
+
+    /// Tells the chassis what was measured.
+    pub fn tell(&mut self, spans: &mut Vec<Span>) {
+        if let Some((sender, seq)) = &mut self.measured
+            && !spans.is_empty()
+        {
+            // a chassis that does not keep up counts what it has missed
+            let _ = sender.send(&Header { t: 0, seq: *seq, crc: 0, wall_ns: 0 }, spans);
+            *seq = seq.wrapping_add(1);
+        }
+        spans.clear();
     }
 
     pub fn grant(&self, transfers: &mut Vec<TransferRecord>) -> Result<Option<Grant>, ChannelError> {

@@ -21,6 +21,9 @@ pub struct Context {
     /// Record to write; none = recording off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub record: Option<PathBuf>,
+    /// What the boards do is measured.
+    #[serde(default)]
+    pub measure: bool,
     /// The scenario with the variant's overrides.
     pub scenario: Scenario,
 }
@@ -120,23 +123,40 @@ fn remove(path: &Path, prefix: &str) {
     let _ = std::fs::remove_dir(base());
 }
 
+/// Folders of this user's runs that somebody holds.
+pub fn live_runs() -> Vec<PathBuf> {
+    runs(false)
+}
+
+/// Folders of this user's runs that nobody holds any more.
+pub fn stale_runs() -> Vec<PathBuf> {
+    runs(true)
+}
+
+fn runs(stale: bool) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(base()) else { return Vec::new() };
+    let is_wanted = |path: &PathBuf| {
+        // a folder without a lock file is one that is just being made
+        let Ok(lock) = File::options().append(true).open(path.join("lock")) else { return false };
+        flock(&lock, FlockOperation::NonBlockingLockExclusive).is_ok() == stale
+    };
+    let mut found: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).filter(is_wanted).collect();
+    found.sort();
+    found
+}
+
 /// Removes the folders of runs that nobody holds any more; returns their paths.
 pub fn clean_stale() -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(base()) else { return Vec::new() };
-    entries
-        .flatten()
-        .map(|entry| entry.path())
-        .filter(|path| {
-            // a folder without a lock file is one that is just being made
-            let Ok(lock) = File::options().append(true).open(path.join("lock")) else { return false };
-            if flock(&lock, FlockOperation::NonBlockingLockExclusive).is_err() {
-                return false;
-            }
+    let stale = stale_runs();
+    for path in &stale {
+        // whoever takes the lock removes; somebody else may have done so meanwhile
+        let Ok(lock) = File::options().append(true).open(path.join("lock")) else { continue };
+        if flock(&lock, FlockOperation::NonBlockingLockExclusive).is_ok() {
             let id = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
             remove(path, &format!("vr{id}_"));
-            true
-        })
-        .collect()
+        }
+    }
+    stale
 }
 
 fn base36(mut number: u64) -> String {

@@ -5,7 +5,7 @@ use crate::realtime::{self, Paced};
 use crate::remote::{Line, READY};
 use crate::{RunError, RunFolder};
 use board::BoardId;
-use channels::{Bells, Domain, Exchange, wall_ns};
+use channels::{Bells, Domain, Exchange, sleep_until, wall_ns};
 use messages::{BOARDS, Grant, NOBODY, flags};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::path::PathBuf;
@@ -52,11 +52,14 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
     let here: Vec<BoardId> = processes[index].boards.iter().filter_map(|board| BoardId::from_name(board)).collect();
     let domain = Domain::join(&folder.path, &folder.prefix, name)?;
     let exchange = Exchange::open(&here, Some(&domain), |board| process_of(&context.scenario, board))?;
-    let mut line = Line::open(&domain, name)?;
+    let mut line = Line::open(&domain, name, context.measure)?;
     let bells = Bells::open(&folder.path.join("bells"), processes.len() + 1)?;
     let mut bell = bells.bell(index + 1);
     let mut host = Host::new(&here, exchange, &context, factory)?;
-    let mut transfers = Vec::with_capacity(64);
+    if context.measure {
+        host.measure(false);
+    }
+    let (mut transfers, mut spans) = (Vec::with_capacity(64), Vec::with_capacity(64));
     line.reply(here[0], READY, &Answer::default())?;
     bells.ring(CHASSIS_BELL);
     let mut until = 0;
@@ -72,9 +75,19 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
             }
             turns = turns.saturating_sub(1);
             if grant.flags & flags::START != 0 {
-                // refused rights are the chassis' to tell, once for all
-                realtime::ask_for_rights(&context.scenario.realtime);
-                host.exchange().measure();
+                let refused = realtime::ask_for_rights(&context.scenario.realtime, Some(&processes[index]));
+                let own = processes[index].priority.is_some() || !processes[index].cpus.is_empty();
+                match refused.is_empty() {
+                    false if context.scenario.realtime.strict => {
+                        return Err(RunError::Refused { what: refused.join("; ") });
+                    }
+                    // what all processes are refused is the chassis' to tell, once
+                    false if own => eprintln!("{name}: real time without {}; the run goes on", refused.join("; ")),
+                    _ => {}
+                }
+                if context.measure {
+                    host.measure(true);
+                }
                 paced = Some(Paced::new(grant.from, &context.scenario));
                 continue;
             }
@@ -83,6 +96,8 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
                 continue;
             }
             let answer = host.step(&grant, &transfers)?;
+            host.take_spans([], &mut spans);
+            line.tell(&mut spans);
             until = grant.until;
             let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
             line.reply(board, grant.window, &answer)?;
@@ -96,15 +111,16 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
         if let Some(paced) = &mut paced
             && let Some(due) = paced.due()
         {
-            realtime::sleep_until(due, LIFELINE_PERIOD);
+            sleep_until(due, LIFELINE_PERIOD);
             if wall_ns() < due {
                 continue;
             }
-            if let Some((grant, answer)) = paced.step(&mut host)? {
+            if let Some((grant, answer)) = paced.step(&mut host, &mut spans)? {
                 until = grant.until;
                 if grant.flags & flags::FINISH != 0 {
-                    realtime::write_measured(&realtime::measured_file(&path, name), paced.measured(&mut host))?;
+                    host.take_spans(host.sent().collect::<Vec<_>>(), &mut spans);
                 }
+                line.tell(&mut spans);
                 let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
                 line.reply(board, grant.window, &answer)?;
                 bells.ring(CHASSIS_BELL);

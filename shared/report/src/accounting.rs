@@ -273,10 +273,14 @@ impl Accounting {
         }
         let Some(decide) = record.decide else { return };
         for &(slave, data_at) in &self.job.reads {
-            self.ages[usize::from(slave)].saturating_record(decide - data_at);
+            // in real time a reading may have been told for a later instant than the decision then had
+            let Some(age) = decide.checked_sub(data_at) else { continue };
+            self.ages[usize::from(slave)].saturating_record(age);
         }
         let Some(read) = self.job.force.take() else { return };
-        let Some((felt, published)) = self.filter.stamps(read.data_at) else { return };
+        let Some((felt, published)) = self.filter.stamps(read.data_at).filter(|(_, published)| *published <= decide) else {
+            return;
+        };
         let [.., since_published, since_felt] = self.ages.as_mut_slice() else { return };
         since_published.saturating_record(decide - published);
         since_felt.saturating_record(decide - felt);

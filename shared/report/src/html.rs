@@ -67,8 +67,8 @@ fn fill_page(head: &Head, charts: &[Chart], sections: &str) -> Result<String, St
         ("cards", head.cards.to_owned()),
         ("pictures", pictures?.join("\n")),
         ("sections", sections.to_owned()),
-        ("style", format!("{UPLOT_STYLE}\n{STYLE}")),
-        ("uplot", format!("/*\n{UPLOT_LICENCE}\n*/\n{UPLOT}")),
+        ("style", style()),
+        ("uplot", uplot()),
         // "</" must not end the script element
         ("data", data.replace("</", "<\\/")),
         ("script", SCRIPT.to_owned()),
@@ -89,8 +89,18 @@ fn pill(of: Verdict) -> String {
     format!("<span class=\"verdict {}\">{}</span>", class(of), verdict(of))
 }
 
+/// Style of every page.
+pub(crate) fn style() -> String {
+    format!("{UPLOT_STYLE}\n{STYLE}")
+}
+
+/// uPlot with its licence.
+pub(crate) fn uplot() -> String {
+    format!("/*\n{UPLOT_LICENCE}\n*/\n{UPLOT}")
+}
+
 /// Replaces `{{name}}`; what is put in is not looked at again.
-fn fill(template: &str, parts: &[(&str, String)]) -> String {
+pub(crate) fn fill(template: &str, parts: &[(&str, String)]) -> String {
     let mut out = String::new();
     let mut rest = template;
     while let Some((before, after)) = rest.split_once("{{") {
@@ -206,7 +216,7 @@ fn latencies(report: &RunReport) -> String {
             shown = Some(&variant.transfers);
         }
         if !variant.measured.is_empty() {
-            let rows = table(&LATENCY_HEADINGS, &latency_rows(&variant.measured));
+            let rows = crate::latency::html(&variant.measured);
             out += &format!("<h3>measured, {}</h3>{rows}", escape(&variant.name));
         }
     }
@@ -335,7 +345,7 @@ fn paragraphs(text: &str) -> String {
         .collect()
 }
 
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

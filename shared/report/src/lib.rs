@@ -12,6 +12,7 @@ mod compare;
 mod envelope;
 mod html;
 mod ideal;
+pub mod latency;
 mod ledger;
 mod measures;
 mod path;

@@ -3,6 +3,7 @@
 use crate::accounting::BusAccount;
 use crate::chart::{Curves, charts};
 use crate::ideal::{Ideal, ideal};
+use crate::latency::LatencyRow;
 use crate::ledger::{Ledger, PathLatency};
 use crate::measures::{Bounds, RunMeasures, first_contact};
 use crate::path::Way;
@@ -48,7 +49,7 @@ pub struct VariantResult {
     /// Account of bus and processors, where the host made one.
     pub bus: Option<BusAccount>,
     /// Latency measured in real time; empty in simulated time.
-    pub measured: Vec<PathLatency>,
+    pub measured: Vec<LatencyRow>,
     /// File name of the record, where one was written.
     pub record: Option<String>,
     /// Digest, where it was computed.
@@ -369,15 +370,18 @@ impl RunReport {
 
     /// Writes `report.json`, `charts.json` (the curves, which `vmerack compare` reads) and `report.html` into the folder.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
-        let write = |name: &str, content: Result<String, String>| {
-            let path = folder.join(name);
-            content
-                .and_then(|content| std::fs::write(&path, content).map_err(|error| error.to_string()))
-                .map_err(|reason| WriteError { path, reason })
-        };
+        let write = |name: &str, content: Result<String, String>| write_file(folder, name, content);
         write("report.json", self.json().map_err(|error| error.to_string()))?;
         let charts = charts(self);
         write("charts.json", serde_json::to_string(&charts).map_err(|error| error.to_string()))?;
         write("report.html", crate::html::render(self, &charts))
     }
+}
+
+/// Writes one file of a report, where its content could be made.
+pub(crate) fn write_file(folder: &Path, name: &str, content: Result<String, String>) -> Result<(), WriteError> {
+    let path = folder.join(name);
+    content
+        .and_then(|content| std::fs::write(&path, content).map_err(|error| error.to_string()))
+        .map_err(|reason| WriteError { path, reason })
 }

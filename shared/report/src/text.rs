@@ -41,7 +41,7 @@ pub fn render(report: &RunReport) -> String {
             accounted = Some(bus);
         }
         if !variant.measured.is_empty() {
-            out += &format!("\nmeasured latency, {}\n{}", variant.name, latencies(&variant.measured));
+            out += &format!("\nmeasured latency, {}\n{}", variant.name, crate::latency::text(&variant.measured));
         }
     }
     for sweep in &report.sweeps {

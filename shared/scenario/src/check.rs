@@ -17,6 +17,7 @@ pub(crate) fn check(scenario: &Scenario) -> Result {
     surfaces(scenario)?;
     rack(scenario)?;
     processes(scenario)?;
+    realtime(scenario)?;
     variants_and_limits(scenario)?;
     reach(scenario)
 }
@@ -220,6 +221,22 @@ fn processes(scenario: &Scenario) -> Result {
         if !placed.iter().any(|(name, _)| *name == board.name()) {
             return Err(Problem::new("process", format!("board `{}` is placed nowhere; every board needs a process", board.name())));
         }
+    }
+    Ok(())
+}
+
+fn realtime(scenario: &Scenario) -> Result {
+    let priority = |key: String, priority: u8| match priority {
+        0..=99 => Ok(()),
+        _ => Err(Problem::new(key, format!("is {priority}, expected 1 to 99, or 0 for time sharing"))),
+    };
+    priority("realtime.priority".into(), scenario.realtime.priority)?;
+    for (i, process) in scenario.processes.iter().enumerate() {
+        process.priority.map_or(Ok(()), |own| priority(format!("process.{i}.priority"), own))?;
+    }
+    for (i, limit) in scenario.realtime.limits.iter().enumerate() {
+        within(format!("realtime.limit.{i}.quantile"), limit.quantile, 0.0..=1.0, "0 to 1")?;
+        positive(format!("realtime.limit.{i}.max_us"), limit.max_us)?;
     }
     Ok(())
 }

@@ -99,7 +99,7 @@ pub struct Variant {
 }
 
 /// One operating-system process.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Process {
     /// Name in the process list.
@@ -109,6 +109,12 @@ pub struct Process {
     /// A user's program in the place of the built-in one, with its arguments.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub command: Vec<String>,
+    /// Its SCHED_FIFO priority in real time, 1–99; 0 = time sharing; default: `realtime.priority`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub priority: Option<u8>,
+    /// Processors that it may run on in real time; default: all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cpus: Vec<usize>,
 }
 
 /// Wall-clock pacing (`--pacing realtime`).
@@ -119,15 +125,39 @@ pub struct Realtime {
     /// default: a tenth of the shortest task period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stage_us: Option<u64>,
-    /// SCHED_FIFO priority of the boards; 0 = time sharing.
+    /// SCHED_FIFO priority of the processes, 1–99; 0 = time sharing. A process may state its own.
     pub priority: u8,
     /// Lock all memory.
     pub lock_memory: bool,
+    /// Refuse to run without a right that the machine refuses.
+    pub strict: bool,
+    /// Measure when boards act and how long messages take.
+    pub measure: bool,
+    /// What must hold of the latencies measured.
+    #[serde(rename = "limit", skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<LatencyLimit>,
+}
+
+/// A limit on a measured latency.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LatencyLimit {
+    /// Path as the table of measured latencies names it, for example `wake-up control_computer`.
+    pub path: String,
+    /// Part of the values that the limit holds for, 0 to 1; 1 = all.
+    #[serde(default = "all")]
+    pub quantile: f64,
+    /// Greatest latency that passes, µs.
+    pub max_us: f64,
+}
+
+fn all() -> f64 {
+    1.0
 }
 
 impl Default for Realtime {
     fn default() -> Self {
-        Realtime { stage_us: None, priority: 50, lock_memory: true }
+        Realtime { stage_us: None, priority: 50, lock_memory: true, strict: false, measure: true, limits: Vec::new() }
     }
 }
 
@@ -169,6 +199,6 @@ fn one() -> u64 {
 fn one_process_per_board() -> Vec<Process> {
     ["hw_sim", "da_io", "force_sensor_if", "encoder_if", "control_computer", "workstation", "bus_analyzer"]
         .into_iter()
-        .map(|board| Process { name: board.into(), boards: vec![board.into()], command: Vec::new() })
+        .map(|board| Process { name: board.into(), boards: vec![board.into()], ..Process::default() })
         .collect()
 }

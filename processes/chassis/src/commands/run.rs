@@ -25,6 +25,9 @@ pub struct RunArgs {
     /// Run every board in this process.
     #[arg(long, conflicts_with = "pacing")]
     in_process: bool,
+    /// In real time: refuse to run without a right that the machine refuses.
+    #[arg(long)]
+    strict: bool,
     /// Folder for report.json, report.html and one record per variant [default: a new folder in runs/].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -52,6 +55,7 @@ pub struct RunArgs {
 pub fn run(args: RunArgs) -> miette::Result<u8> {
     let mut overrides = args.set.clone();
     overrides.extend(args.seed.map(|seed| format!("seed={seed}")));
+    overrides.extend(args.strict.then(|| "realtime.strict=true".to_owned()));
     overrides.extend(args.duration.map(|seconds| format!("duration_s={seconds:?}")));
     let document = scenario::load(&args.scenario, &overrides)?;
     let variants = chosen(&document, &args.variant)?;
@@ -67,7 +71,7 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
     let (mut failed, mut losses) = (false, false);
     for (variant, scenario) in &variants {
         let record = (!args.no_record).then(|| folder.join(format!("{}.mcap", variant.name)));
-        let setting = Setting { pacing: args.pacing, in_process: args.in_process, record: record.clone() };
+        let setting = Setting { pacing: args.pacing, in_process: args.in_process, record: record.clone(), measure: false };
         let finished = run_with_progress(scenario, variant, &setting)?;
         let mut result = finished.result;
         if let Some(error) = &finished.error {

@@ -78,6 +78,23 @@ echo
 echo "one hop, 256 bytes, between two processes"
 "$release/examples/hop"
 echo
+echo "lock step, all processes, empty boards and their data over iceoryx2, best of three"
+windows() {
+    for bell in yield block spin; do
+        for _ in 1 2 3; do VMERACK_BELL=$bell "$release/examples/windows" 2; done | sort -k2 -n | tail -n 1
+    done
+}
+windows
+for _ in 1 2; do
+    (while :; do :; done) &
+    hogs+=($!)
+done
+echo "the same beside two hogs"
+windows
+kill "${hogs[@]}"
+hogs=()
+
+echo
 echo "integration of the plant"
 "$release/examples/integrators"
 if [ "${1:-}" = --outside ]; then

@@ -174,7 +174,9 @@ fn the_doctor_gives_a_remedy_for_everything_that_hurts() {
     let outcome = Bench::new().run(&["doctor", "--json"]).expect_code(0).expect_nothing_left();
     let findings: serde_json::Value = serde_json::from_str(&outcome.stdout).expect("JSON");
     let findings = findings.as_array().expect("a list");
-    for subject in ["preemption", "governor", "SCHED_FIFO", "RT throttling", "hypervisor", "shared memory", "stale runs"] {
+    for subject in
+        ["preemption", "governor", "SCHED_FIFO", "RT throttling", "hypervisor", "shared memory", "stale runs"]
+    {
         assert!(findings.iter().any(|finding| finding["subject"] == subject), "{subject}");
     }
     for finding in findings {
@@ -202,7 +204,8 @@ fn top_shows_a_run_in_real_time_while_it_lives_and_nothing_afterwards() {
         }
     };
     let rows = runs[0]["rows"].as_array().expect("rows");
-    for path in ["wake-up control_computer", "step hw_sim", "hw_sim/plant to da_io", "age of the force value when used"] {
+    for path in ["wake-up control_computer", "step hw_sim", "hw_sim/plant to da_io", "age of the force value when used"]
+    {
         let row = rows.iter().find(|row| row["path"] == path).unwrap_or_else(|| panic!("no {path} in {rows:#?}"));
         assert!(row["per_s"].as_f64() > Some(0.0), "{row:#}");
     }

@@ -86,7 +86,8 @@ fn a_strict_run_refuses_what_the_machine_refuses() {
 #[test]
 fn a_process_runs_on_the_processors_and_with_the_priority_that_the_scenario_gives_it() {
     let bench = Bench::new();
-    let edits = [("process.hw_sim.cpus", toml::Value::from(vec![0])), ("process.hw_sim.priority", toml::Value::from(61))];
+    let edits =
+        [("process.hw_sim.cpus", toml::Value::from(vec![0])), ("process.hw_sim.priority", toml::Value::from(61))];
     let scenario = bench.scenario("s.toml", &edits);
     let mut running = bench.start(&run(scenario, "50"));
     let processes = running.wait_for_processes(7);

@@ -42,7 +42,8 @@ pub enum Means {
 
 impl Means {
     /// All.
-    pub const ALL: [Means; 6] = [Means::Timer, Means::Pipe, Means::Socket, Means::Futex, Means::Polled, Means::Blocking];
+    pub const ALL: [Means; 6] =
+        [Means::Timer, Means::Pipe, Means::Socket, Means::Futex, Means::Polled, Means::Blocking];
 
     /// Its name in tables.
     pub fn name(self) -> &'static str {
@@ -148,7 +149,9 @@ impl Outgoing {
     fn send(&mut self, stamp: u64) -> Result<(), String> {
         let message: Message = [stamp; WORDS];
         match self {
-            Outgoing::Stream(stream) => stream.write_all(bytemuck::cast_slice(&message)).map_err(|error| error.to_string()),
+            Outgoing::Stream(stream) => {
+                stream.write_all(bytemuck::cast_slice(&message)).map_err(|error| error.to_string())
+            }
             Outgoing::Shared(bells) => {
                 bells.put(1, bytemuck::cast_slice(&message));
                 bells.ring(0);

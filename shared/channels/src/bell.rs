@@ -2,7 +2,8 @@
 //!
 //! A waiter first yields the processor a few times, since the ringer usually runs on it next, then blocks. On a
 //! machine with busy hogs a yield lasts a whole time slice: when one took over [`YIELD_LIMIT`], the next
-//! [`BLOCK_AT_ONCE`] waits block at once.
+//! [`BLOCK_AT_ONCE`] waits block at once. That is the outcome of `windows`, the benchmark of lock step (table in the
+//! README); the environment variable `VMERACK_BELL` (`yield`, `block`, `spin`) chooses another way of waiting for it.
 
 use crate::ChannelError;
 use memmap2::MmapMut;
@@ -30,12 +31,34 @@ pub struct Bells {
     page: Arc<MmapMut>,
 }
 
+/// How a process waits before it sleeps.
+#[derive(Clone, Copy, Debug)]
+enum Waiting {
+    /// Gives the processor away a few times.
+    Yield,
+    /// Not at all.
+    Block,
+    /// Keeps the processor for a while.
+    Spin,
+}
+
+impl Waiting {
+    fn chosen() -> Waiting {
+        match std::env::var("VMERACK_BELL").as_deref() {
+            Ok("block") => Waiting::Block,
+            Ok("spin") => Waiting::Spin,
+            _ => Waiting::Yield,
+        }
+    }
+}
+
 /// One process's bell, as its owner holds it.
 pub struct Bell {
     bells: Bells,
     index: usize,
     heard: u32,
     block_at_once: u32,
+    waiting: Waiting,
 }
 
 impl Bells {
@@ -100,7 +123,7 @@ impl Bells {
 
     /// The bell of process `index`, for its owner.
     pub fn bell(&self, index: usize) -> Bell {
-        Bell { bells: self.clone(), index, heard: 0, block_at_once: 0 }
+        Bell { bells: self.clone(), index, heard: 0, block_at_once: 0, waiting: Waiting::chosen() }
     }
 }
 
@@ -111,23 +134,44 @@ impl Bell {
         if rung > 0 {
             return rung;
         }
-        if self.block_at_once == 0 {
-            for _ in 0..YIELDS {
-                let before = Instant::now();
-                std::thread::yield_now();
-                let rung = self.rung();
-                if rung > 0 {
-                    return rung;
-                }
-                if before.elapsed() > YIELD_LIMIT {
-                    self.block_at_once = BLOCK_AT_ONCE;
-                    break;
-                }
+        let rung = match self.waiting {
+            Waiting::Block => 0,
+            Waiting::Spin => self.spin(),
+            Waiting::Yield if self.block_at_once > 0 => {
+                self.block_at_once -= 1;
+                0
             }
-        } else {
-            self.block_at_once -= 1;
+            Waiting::Yield => self.yield_a_few_times(),
+        };
+        if rung > 0 { rung } else { self.block(limit) }
+    }
+
+    fn yield_a_few_times(&mut self) -> u32 {
+        for _ in 0..YIELDS {
+            let before = Instant::now();
+            std::thread::yield_now();
+            let rung = self.rung();
+            if rung > 0 {
+                return rung;
+            }
+            if before.elapsed() > YIELD_LIMIT {
+                self.block_at_once = BLOCK_AT_ONCE;
+                break;
+            }
         }
-        self.block(limit)
+        0
+    }
+
+    fn spin(&mut self) -> u32 {
+        let since = Instant::now();
+        while since.elapsed() < YIELD_LIMIT {
+            let rung = self.rung();
+            if rung > 0 {
+                return rung;
+            }
+            std::hint::spin_loop();
+        }
+        0
     }
 
     /// Waits as [`Bell::wait`] does, but blocks at once.

@@ -332,7 +332,8 @@ mod tests {
                 assert_eq!((hops[0].late, hops[0].number, hops[0].t), (late, seq, 7));
                 assert!(before <= hops[0].begin && hops[0].begin <= hops[0].end);
             }
-            let sent: Vec<Span> = a.sent().filter(|span| ROUTES[span.channel as usize].kind == Kind::Amplifier).collect();
+            let sent: Vec<Span> =
+                a.sent().filter(|span| ROUTES[span.channel as usize].kind == Kind::Amplifier).collect();
             assert_eq!(sent[0].number, 3);
         }
         assert!(crate::remove_leftovers(&prefix).is_empty());

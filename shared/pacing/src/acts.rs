@@ -56,7 +56,8 @@ impl Acts {
             }
             BoardId::ControlComputer => {
                 let probes = outputs.mail.control_probe.iter();
-                let decisions = probes.map(|probe| Span { t: probe.t, number: probe.job.into(), ..span(SpanKind::Decision) });
+                let decisions =
+                    probes.map(|probe| Span { t: probe.t, number: probe.job.into(), ..span(SpanKind::Decision) });
                 self.spans.extend(decisions);
             }
             BoardId::DaIo => {
@@ -66,7 +67,9 @@ impl Acts {
                     let output = Span { t: write.data_at, number, ..span(SpanKind::Output) };
                     match self.spans.last_mut() {
                         // of a job's writes the last one counts
-                        Some(last) if last.kind == output.kind && last.number == number && last.window == output.window => {
+                        Some(last)
+                            if last.kind == output.kind && last.number == number && last.window == output.window =>
+                        {
                             *last = output;
                         }
                         _ => self.spans.push(output),

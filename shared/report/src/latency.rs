@@ -7,6 +7,6 @@ mod row;
 
 pub use cycle::{Clock, Cycle, PARTS, WHOLE};
 pub use journal::{ChannelCount, Journal, Measurement};
-pub use output::{LatencyCheck, LatencyReport, MeasuringCost, text};
 pub(crate) use output::html;
+pub use output::{LatencyCheck, LatencyReport, MeasuringCost, text};
 pub use row::{LatencyRow, Recorder};

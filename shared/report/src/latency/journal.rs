@@ -94,7 +94,9 @@ struct Hops {
 
 /// Channel as tables name it.
 fn channel_name(index: u32) -> String {
-    ROUTES.get(index as usize).map_or_else(String::new, |route| format!("{}/{:?}", route.from.name(), route.kind).to_lowercase())
+    ROUTES
+        .get(index as usize)
+        .map_or_else(String::new, |route| format!("{}/{:?}", route.from.name(), route.kind).to_lowercase())
 }
 
 fn board_name(number: u32) -> &'static str {

@@ -18,8 +18,15 @@ const HIST_US: usize = 1000;
 const HEADINGS: [&str; 11] =
     ["path", "n", "min µs", "p50 µs", "p90 µs", "p99 µs", "p99.9 µs", "p99.99 µs", "max µs", "missed", "p50 / pipe"];
 const CHANNEL_HEADINGS: [&str; 7] = ["channel", "reader", "sent", "read", "late", "lost", "twice"];
-const CYCLE_HEADINGS: [&str; 7] =
-    ["cycle", "decided s", "arm to sensor µs", "sensor to decision µs", "decision to D/A µs", "whole µs", "what happened"];
+const CYCLE_HEADINGS: [&str; 7] = [
+    "cycle",
+    "decided s",
+    "arm to sensor µs",
+    "sensor to decision µs",
+    "decision to D/A µs",
+    "whole µs",
+    "what happened",
+];
 const LIMIT_HEADINGS: [&str; 5] = ["path", "quantile", "value µs", "limit", ""];
 
 /// One limit of the scenario, judged.
@@ -99,7 +106,8 @@ impl LatencyReport {
     /// Tables for a terminal.
     pub fn text(&self) -> String {
         let facts: String = self.machine.iter().map(|(name, value)| format!("  {name}: {value}\n")).collect();
-        let mut out = format!("{}, control task at {} Hz, {} s in real time\n{facts}", self.scenario, self.rate_hz, self.seconds);
+        let mut out =
+            format!("{}, control task at {} Hz, {} s in real time\n{facts}", self.scenario, self.rate_hz, self.seconds);
         for (title, table) in self.tables(table) {
             out += &format!("\n{title}\n{table}");
         }
@@ -114,7 +122,10 @@ impl LatencyReport {
             ("messages", table(&CHANNEL_HEADINGS, &self.channels())),
             ("longest cycles", table(&CYCLE_HEADINGS, &cycles(&self.measured))),
             ("modelled: cycles in simulated time", table(&HEADINGS, &rows(&self.modelled.rows))),
-            ("modelled: bus transfers in simulated time", table(&LATENCY_HEADINGS, &latency_rows(&self.modelled_transfers))),
+            (
+                "modelled: bus transfers in simulated time",
+                table(&LATENCY_HEADINGS, &latency_rows(&self.modelled_transfers)),
+            ),
         ];
         if !self.limits.is_empty() {
             tables.push(("limits", table(&LIMIT_HEADINGS, &self.checks())));
@@ -124,7 +135,8 @@ impl LatencyReport {
 
     fn channels(&self) -> Vec<Vec<String>> {
         let row = |count: &super::journal::ChannelCount| {
-            let figures = [count.sent, count.read, count.late, count.lost, count.twice].map(|figure| figure.to_string());
+            let figures =
+                [count.sent, count.read, count.late, count.lost, count.twice].map(|figure| figure.to_string());
             [vec![count.channel.clone(), count.reader.clone()], figures.to_vec()].concat()
         };
         self.measured.channels.iter().map(row).collect()
@@ -143,9 +155,19 @@ impl LatencyReport {
         let m = &self.measured;
         let sum: u64 = m.parts_sum_ns.iter().sum();
         let mut remarks = vec![
-            format!("{} cycles answered, {} without a torque or decided without their reading", m.cycles, m.broken_cycles),
-            format!("parts of all cycles {sum} ns, wholes {} ns: difference {} ns", m.whole_sum_ns, m.whole_sum_ns.abs_diff(sum)),
-            format!("values overwritten by newer ones before use {}, writes made late {}", m.overwritten, m.delayed_writes),
+            format!(
+                "{} cycles answered, {} without a torque or decided without their reading",
+                m.cycles, m.broken_cycles
+            ),
+            format!(
+                "parts of all cycles {sum} ns, wholes {} ns: difference {} ns",
+                m.whole_sum_ns,
+                m.whole_sum_ns.abs_diff(sum)
+            ),
+            format!(
+                "values overwritten by newer ones before use {}, writes made late {}",
+                m.overwritten, m.delayed_writes
+            ),
             format!("messages of measurements lost {}", m.unmeasured),
         ];
         if let Some(cost) = &self.measuring_cost {
@@ -198,10 +220,10 @@ impl LatencyReport {
         let each = |figure: &dyn Fn(&LatencyRow) -> u64| {
             columns.iter().map(|row| format!("{:05}", figure(row))).collect::<Vec<_>>().join(" ")
         };
-        let mean = |row: &LatencyRow| {
-            row.histogram.iter().map(|(ns, count)| ns / 1000 * count).sum::<u64>() / row.n.max(1)
-        };
-        let names: String = columns.iter().enumerate().map(|(i, row)| format!("# Thread {i}: {}\n", row.path)).collect();
+        let mean =
+            |row: &LatencyRow| row.histogram.iter().map(|(ns, count)| ns / 1000 * count).sum::<u64>() / row.n.max(1);
+        let names: String =
+            columns.iter().enumerate().map(|(i, row)| format!("# Thread {i}: {}\n", row.path)).collect();
         let lines: String = (0..)
             .zip(&counts)
             .map(|(us, line): (usize, _)| {

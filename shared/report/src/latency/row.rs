@@ -107,7 +107,8 @@ impl Recorder {
         }
         let tag = self.path.replace([' ', ','], "_");
         let (mut line, mut serializer) = (Vec::new(), V2Serializer::new());
-        let begun = IntervalLogWriterBuilder::new().with_max_value_divisor(1e6).begin_log_with(&mut line, &mut serializer);
+        let begun =
+            IntervalLogWriterBuilder::new().with_max_value_divisor(1e6).begin_log_with(&mut line, &mut serializer);
         let written = begun.map(|mut log| {
             let start = Duration::from_secs(self.second);
             log.write_histogram(&self.of_second, start, Duration::from_secs(1), Tag::new(&tag))
@@ -135,7 +136,11 @@ impl Recorder {
             max_ns: self.values.max(),
             missed: self.missed,
             p50_to_pipe: None,
-            histogram: self.values.iter_recorded().map(|bucket| (bucket.value_iterated_to(), bucket.count_at_value())).collect(),
+            histogram: self
+                .values
+                .iter_recorded()
+                .map(|bucket| (bucket.value_iterated_to(), bucket.count_at_value()))
+                .collect(),
             path: self.path,
             log: self.log,
         }
@@ -173,7 +178,9 @@ mod tests {
     fn a_row_shows_the_quantiles_of_its_values_to_three_digits() {
         let row = thousand().finish();
         assert_eq!((row.n, row.min_ns / 1000, row.missed), (1000, 1, Some(0)));
-        for (found, expected) in [(row.p50_ns, 500_000), (row.p90_ns, 900_000), (row.p99_ns, 990_000), (row.max_ns, 1_000_000)] {
+        for (found, expected) in
+            [(row.p50_ns, 500_000), (row.p90_ns, 900_000), (row.p99_ns, 990_000), (row.max_ns, 1_000_000)]
+        {
             assert!(found.abs_diff(expected) <= expected / 1000, "{found} instead of {expected}");
         }
         assert_eq!(row.quantile(0.99), row.p99_ns);

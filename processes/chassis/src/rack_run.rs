@@ -171,7 +171,7 @@ pub fn rehearse(scenario: &Scenario) -> Result<(Vec<Program>, BusAccount), Strin
 /// Runs the start of a scenario in this process, up to `end`, for somebody who listens.
 pub fn listen(scenario: &Scenario, end: Ns, observer: &mut dyn Observer) -> Result<Lockstep, String> {
     let scenario = Scenario { processes: vec![everything_in_the_chassis()], ..scenario.clone() };
-    let context = Context { prefix: String::new(), variant: String::new(), record: None, scenario };
+    let context = Context { prefix: String::new(), variant: String::new(), record: None, measure: false, scenario };
     let run = || -> Result<Lockstep, RunError> {
         let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
         rack.run(end, observer)?;

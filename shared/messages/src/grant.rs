@@ -41,7 +41,8 @@ pub mod flags {
     pub const RERUN: u32 = 4;
     /// Grant: the run ends here; write out what is pending.
     pub const FINISH: u32 = 8;
-    /// Grant: real time; simulated time 0 is when CLOCK_MONOTONIC shows `from` ns. Not answered.
+    /// Grant: real time. First with `from` 0: get ready, and answer; then simulated time 0 is when CLOCK_MONOTONIC shows
+    /// `from` ns, not answered.
     pub const START: u32 = 128;
     /// Reply: the operations that follow are the rest of the job; otherwise the last rest is used again.
     pub const NEW_REST: u32 = 16;

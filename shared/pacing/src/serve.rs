@@ -74,6 +74,10 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
                 continue;
             }
             turns = turns.saturating_sub(1);
+            if grant.flags & flags::START != 0 && grant.from != 0 {
+                paced = Some(Paced::new(grant.from, &context.scenario));
+                continue;
+            }
             if grant.flags & flags::START != 0 {
                 let refused = realtime::ask_for_rights(&context.scenario.realtime, Some(&processes[index]));
                 let own = processes[index].priority.is_some() || !processes[index].cpus.is_empty();
@@ -88,7 +92,8 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
                 if context.measure {
                     host.measure(true);
                 }
-                paced = Some(Paced::new(grant.from, &context.scenario));
+                line.reply(here[0], grant.window, &Answer::default())?;
+                bells.ring(CHASSIS_BELL);
                 continue;
             }
             if let Some(paced) = &mut paced {

@@ -44,7 +44,9 @@ impl Writes {
         self.commands += mail.commands.len();
         self.ready.clear();
         self.late = 0;
-        for i in 0..self.waiting.len() {
+        // what waits has been looked for in all that came before
+        let any = !mail.words.is_empty() || self.commands > 0;
+        for i in 0..if any { self.waiting.len() } else { 0 } {
             let transfer = self.waiting[i];
             if self.has_come(&transfer) {
                 self.late += 1;

@@ -184,5 +184,6 @@ const fn figures(kind: EventKind) -> [&'static str; 2] {
         ForceSaturated => ["errors", ""],
         RecordLost => ["", ""],
         OverrunTrip => ["job", "task"],
+        FaultInjected => ["fault", ""],
     }
 }

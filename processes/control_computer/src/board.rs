@@ -86,7 +86,7 @@ impl ControlComputer {
             program: BusProgram::new(scenario)?,
             sensors: Sensors::new(scenario)?,
             pipeline: Pipeline::new(scenario)?,
-            safety: Safety::new(),
+            safety: Safety::new(&scenario.safety),
             converters: Converters {
                 nm_per_v: scenario.drives()?.each(|drive| drive.amplifier_nm_per_v),
                 bits: scenario.da_io.bits.into(),
@@ -211,6 +211,9 @@ impl ControlComputer {
             &Signs {
                 drive_status: self.sensors.status(),
                 held_jobs: self.sensors.held_jobs(),
+                old_force_jobs: self.sensors.old_force_jobs(),
+                same_force_jobs: self.sensors.same_force_jobs(),
+                saturated_jobs: self.sensors.saturated_jobs(),
                 speed: self.sensors.sensed().qd.amax(),
                 finite: self.finite,
                 hold: self.hold,

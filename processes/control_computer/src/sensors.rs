@@ -8,7 +8,7 @@ use crate::program::{COUNTER, COUNTS, ERRORS, FORCES, READS, STATUS, is_wide};
 use arm::{JointVector, Spatial};
 use messages::registers::{encoder, force};
 use messages::{BusWord, JOINTS};
-use scenario::{ForceFilter, Scenario};
+use scenario::{ForceFilter, Scenario, nanoseconds};
 use vme::Ns;
 
 /// Errors of the receiver under which its force words mean nothing.
@@ -50,6 +50,10 @@ pub struct Sensors {
     wide_force: bool,
     force_period_ns: u64,
     force_published: Ns,
+    max_force_age: Ns,
+    old_force_jobs: u32,
+    same_force_jobs: u32,
+    saturated_jobs: u32,
     status: u32,
 }
 
@@ -60,9 +64,9 @@ impl Sensors {
         let counts_per_rad = drives.each(|drive| drive.counts_per_rad());
         let posture = scenario.initial_posture()?;
         let receiver = &scenario.force_sensor_if;
-        let force_period_ns = match receiver.filter {
-            ForceFilter::Cascade(n) => 125_000 << (2 * u32::from(n)),
-            ForceFilter::DelayMs(_) => 125_000,
+        let (force_period_ns, force_delay_ns) = match receiver.filter {
+            ForceFilter::Cascade(n) => (125_000 << (2 * u32::from(n)), 0),
+            ForceFilter::DelayMs(ms) => (125_000, nanoseconds(ms * 1e-3)),
         };
         let full_scale =
             Spatial::from_fn(|axis, _| if axis < 3 { receiver.full_scale_n } else { receiver.full_scale_nm });
@@ -80,6 +84,10 @@ impl Sensors {
             wide_force: is_wide(scenario),
             force_period_ns,
             force_published: 0,
+            max_force_age: force_period_ns + force_delay_ns + nanoseconds(scenario.safety.max_force_age_ms * 1e-3),
+            old_force_jobs: 0,
+            same_force_jobs: 0,
+            saturated_jobs: 0,
             status: 0,
         })
     }
@@ -138,6 +146,21 @@ impl Sensors {
         self.held.iter().copied().max().unwrap_or(0)
     }
 
+    /// Jobs in a row in which the force sample was older than the scenario allows.
+    pub fn old_force_jobs(&self) -> u32 {
+        self.old_force_jobs
+    }
+
+    /// Jobs in a row in which all force words were those of the job before.
+    pub fn same_force_jobs(&self) -> u32 {
+        self.same_force_jobs
+    }
+
+    /// Jobs in a row in which an axis of the force sensor was saturated.
+    pub fn saturated_jobs(&self) -> u32 {
+        self.saturated_jobs
+    }
+
     /// Age of the force sample at `now`: since its filter's output was published. The receiver's counter numbers the
     /// multiples of the filter's period, modulo 2¹⁶; behind a pure delay it numbers the samples that come out.
     pub fn force_age(&self, now: Ns) -> Ns {
@@ -171,6 +194,7 @@ impl Sensors {
     }
 
     fn read_force(&mut self) {
+        let before = self.sensed.wrench;
         for axis in 0..6 {
             let at = FORCES + axis;
             if self.has(at) {
@@ -184,8 +208,22 @@ impl Sensors {
             let newest = word.t / self.force_period_ns;
             let lag = (newest as u16).wrapping_sub(word.value as u16);
             self.force_published = newest.saturating_sub(lag.into()) * self.force_period_ns;
+            let old = self.force_age(word.t) > self.max_force_age;
+            count(&mut self.old_force_jobs, old);
+        }
+        if self.came & FORCE_WORDS == FORCE_WORDS {
+            count(&mut self.same_force_jobs, self.sensed.wrench == before);
+        }
+        if self.has(ERRORS) {
+            let saturated = self.words[ERRORS].value & u32::from(force::ERROR_SATURATED) != 0;
+            count(&mut self.saturated_jobs, saturated);
         }
     }
+}
+
+/// Counts how often in a row something was so.
+fn count(times: &mut u32, again: bool) {
+    *times = if again { times.saturating_add(1) } else { 0 };
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! that failed on the bus changes nothing and gets no answer. While the wires are silent their last value holds.
 
 use crate::delay::DelayLine;
+use crate::faults::Faults;
 use crate::filter::Cascade;
 use crate::gauges::Gauges;
 use crate::registers::{Register, Word};
@@ -31,6 +32,7 @@ pub struct ForceSensorIf {
     full_scale: [f64; AXES],
     wires: Wires,
     gauges: Gauges,
+    faults: Faults,
     /// Offset registers: added to every sample.
     offset: Counts,
     sampler: Option<Sampler>,
@@ -45,6 +47,8 @@ pub struct ForceSensorIf {
 struct Sampler {
     /// Number of the sample, taken at this many times 125 µs.
     k: u64,
+    /// Number of the newest one that has come.
+    came: u64,
     value: Counts,
     warnings: u16,
     errors: u16,
@@ -74,6 +78,7 @@ impl ForceSensorIf {
             full_scale: [n, n, n, tenths_nm, tenths_nm, tenths_nm],
             wires: Wires::default(),
             gauges: Gauges::new(scenario),
+            faults: Faults::new(scenario),
             offset: [0.0; AXES],
             sampler: None,
             delay,
@@ -89,23 +94,31 @@ impl ForceSensorIf {
             if k * SAMPLE_NS > until {
                 return;
             }
-            let Some(wrench) = self.wires.at(k * SAMPLE_NS, plant) else {
+            let t = k * SAMPLE_NS;
+            let Some(wrench) = self.wires.at(t, plant) else {
                 return;
             };
+            self.faults.advance(t, |fault, from| {
+                events.push(Event::new(from, EventKind::FaultInjected, Severity::Warn, fault as f64, 0.0));
+            });
+            if let Some(newest) = self.sampler.as_mut().filter(|_| self.faults.dropped()) {
+                newest.k = k;
+                continue;
+            }
             if self.sampler.is_none() {
                 self.cascade = Cascade::settled(self.gauges.quiet(&wrench));
             }
-            let raw = self.gauges.sample(&wrench);
+            let felt = self.faults.felt(t, wrench);
+            let raw = self.faults.sent(self.gauges.sample(&felt));
             let value = sum(&raw, &self.offset);
             self.cascade.push(k, value);
             if let Some(delay) = &mut self.delay {
                 delay.push(k, value);
             }
-            let errors = self.gauges.saturated(&raw);
+            let mut errors = self.gauges.saturated(&raw);
             let mut saturated = self.sampler.and_then(|before| before.saturated);
             if errors != 0 {
                 if saturated.is_none_or(|before| k - before > QUIET_SAMPLES) {
-                    let t = k * SAMPLE_NS;
                     events.push(Event::new(
                         t,
                         EventKind::ForceSaturated,
@@ -116,9 +129,13 @@ impl ForceSensorIf {
                 }
                 saturated = Some(k);
             }
+            if self.faults.open() {
+                errors |= force::ERROR_SENSOR_CHANGE;
+            }
             let warnings = self.gauges.near_saturation(&raw);
             self.sampler = Some(Sampler {
                 k,
+                came: k,
                 value,
                 warnings,
                 errors,
@@ -150,10 +167,10 @@ impl ForceSensorIf {
                 let k = self
                     .delay
                     .as_ref()
-                    .map_or(newest.k, |delay| delay.counter(t));
+                    .map_or(newest.came, |delay| delay.counter(t));
                 u32::from(k as u16)
             }
-            Register::Counter(n) => u32::from((newest.k >> (2 * n)) as u16),
+            Register::Counter(n) => u32::from((newest.came >> (2 * n)) as u16),
             Register::Warnings => newest.warnings.into(),
             Register::Errors => newest.errors.into(),
             Register::Other => 0,

@@ -90,28 +90,44 @@ fn beyond(counts: &Counts, limit: f64) -> u16 {
 struct Noise {
     /// Standard deviations, N and Nm.
     deviation: [f64; AXES],
-    rng: ChaCha8Rng,
+    normal: Normal,
 }
 
 impl Noise {
     fn new(seed: u64, deviation: [f64; AXES]) -> Noise {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(BoardId::ForceSensorIf as u64);
-        Noise { deviation, rng }
+        Noise { deviation, normal: Normal::new(seed, BoardId::ForceSensorIf as u64) }
     }
 
     fn draw(&mut self) -> [f64; AXES] {
         let mut noise = self.deviation;
         for pair in noise.chunks_exact_mut(2) {
-            let (a, b) = self.normal_pair();
+            let (a, b) = self.normal.pair();
             pair[0] *= a;
             pair[1] *= b;
         }
         noise
     }
+}
 
-    /// Two independent standard normal numbers (Box–Muller).
-    fn normal_pair(&mut self) -> (f64, f64) {
+/// Standard normal numbers from a random stream of their own.
+#[derive(Clone, Debug)]
+pub struct Normal(ChaCha8Rng);
+
+impl Normal {
+    /// That stream of the scenario's seed.
+    pub fn new(seed: u64, stream: u64) -> Normal {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(stream);
+        Normal(rng)
+    }
+
+    /// The next number.
+    pub fn draw(&mut self) -> f64 {
+        self.pair().0
+    }
+
+    /// Two independent ones (Box–Muller).
+    fn pair(&mut self) -> (f64, f64) {
         let radius = (-2.0 * libm::log(self.uniform())).sqrt();
         let (sin, cos) = libm::sincos(TAU * self.uniform());
         (radius * cos, radius * sin)
@@ -119,7 +135,7 @@ impl Noise {
 
     /// Uniform in (0, 1].
     fn uniform(&mut self) -> f64 {
-        ((self.rng.next_u64() >> 11) + 1) as f64 / (1_u64 << 53) as f64
+        ((self.0.next_u64() >> 11) + 1) as f64 / (1_u64 << 53) as f64
     }
 }
 

@@ -10,6 +10,7 @@
 
 mod board;
 pub mod delay;
+mod faults;
 pub mod filter;
 pub mod gauges;
 pub mod registers;

@@ -48,6 +48,8 @@ pub enum EventKind {
     RecordLost = 14,
     /// The release of job `a` of task `b` found the job before still running, and the task was stopped for good.
     OverrunTrip = 15,
+    /// Fault `a` of the scenario is injected.
+    FaultInjected = 16,
 }
 
 impl EventKind {
@@ -69,6 +71,7 @@ impl EventKind {
             EventKind::ForceSaturated => "force-saturated",
             EventKind::RecordLost => "record-lost",
             EventKind::OverrunTrip => "overrun-trip",
+            EventKind::FaultInjected => "fault-injected",
         }
     }
 
@@ -91,6 +94,7 @@ impl EventKind {
             ForceSaturated,
             RecordLost,
             OverrunTrip,
+            FaultInjected,
         ]
         .into_iter()
         .find(|kind| *kind as u32 == number)

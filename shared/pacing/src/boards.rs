@@ -41,6 +41,8 @@ pub(crate) struct Boards {
     of_slave: Vec<BoardId>,
     /// Transfers made to each board in the window.
     pub transfers: [Vec<TransferRecord>; BOARDS.len()],
+    /// The scenario's numbers of the timing plane's faults.
+    pub faults: Vec<usize>,
     /// Number of the window.
     pub window: u64,
     /// Simulated time reached.
@@ -75,7 +77,8 @@ impl Boards {
         interrupted: &'static AtomicBool,
     ) -> Result<(Boards, Timing), RunError> {
         let scenario = context.scenario.clone();
-        let mut timing = Timing::new(scenario.rack.clone())?;
+        let (fault_plan, faults) = scenario.fault_plan();
+        let mut timing = Timing::with_faults(scenario.rack.clone(), fault_plan)?;
         let place = BOARDS.map(|board| process_of(&scenario, board));
         let away: Vec<usize> = (0..scenario.processes.len()).filter(|i| place.contains(&(i + 1))).collect();
         let here: Vec<BoardId> = BOARDS.into_iter().filter(|board| place[*board as usize] == 0).collect();
@@ -125,6 +128,7 @@ impl Boards {
             of_task: scenario.rack.tasks.iter().map(|task| board_named(&task.board)).collect(),
             of_slave: scenario.rack.slaves.iter().map(|slave| board_named(&slave.board)).collect(),
             transfers: Default::default(),
+            faults: faults.into_iter().map(|occurrence| occurrence.fault).collect(),
             window: 0,
             reached: 0,
             spans: context.measure.then(Vec::new),

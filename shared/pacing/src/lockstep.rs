@@ -163,10 +163,17 @@ impl Lockstep {
             self.answered(i)?;
         }
         self.own_mail.clear();
-        if let Stop::Overrun { task, job } = stop {
-            self.ahead.halt(task);
-            let event = Event::new(until, EventKind::OverrunTrip, Severity::Error, job.into(), task.into());
-            self.own_mail.events.push(event);
+        match stop {
+            Stop::Overrun { task, job } => {
+                self.ahead.halt(task);
+                let event = Event::new(until, EventKind::OverrunTrip, Severity::Error, job.into(), task.into());
+                self.own_mail.events.push(event);
+            }
+            Stop::Fault { fault } => {
+                let fault = self.boards.faults[usize::from(fault)] as f64;
+                self.own_mail.events.push(Event::new(until, EventKind::FaultInjected, Severity::Warn, fault, 0.0));
+            }
+            Stop::Limit | Stop::Decision { .. } => {}
         }
         self.record(from, until)?;
         std::mem::swap(&mut self.timing, &mut self.ahead);

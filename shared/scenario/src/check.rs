@@ -16,6 +16,9 @@ pub(crate) fn check(scenario: &Scenario) -> Result {
     segments(scenario)?;
     surfaces(scenario)?;
     rack(scenario)?;
+    crate::faults::check(scenario)?;
+    within("safety.max_force_age_ms", scenario.safety.max_force_age_ms, 0.0..=10_000.0, "0 to 10000")?;
+    within("safety.stop_time_ms", scenario.safety.stop_time_ms, 0.0..=10_000.0, "0 to 10000")?;
     processes(scenario)?;
     realtime(scenario)?;
     variants_and_limits(scenario)?;

@@ -8,6 +8,7 @@
 pub mod builtin;
 mod check;
 mod error;
+mod faults;
 mod hardware;
 mod load;
 pub mod model;
@@ -16,6 +17,7 @@ mod posture;
 
 pub use check::warnings;
 pub use error::ScenarioError;
+pub use faults::Occurrence;
 pub use load::{Document, load};
 pub use model::*;
 pub use hardware::{nanoseconds, rpy_deg};

@@ -3,15 +3,19 @@
 //! fixed in the world, z **into** the surface, moments about the tool point.
 
 mod controller;
+mod fault;
 mod interfaces;
 mod limit;
 mod plant;
+mod safety;
 mod segment;
 
 pub use controller::{Controller, JointLimitTask, Scheme};
+pub use fault::{Fault, FaultKind};
 pub use interfaces::{DaIo, EncoderIf, ForceSensorIf, ForceFilter, VelocitySource};
 pub use limit::{Limit, Measure};
 pub use plant::{Arm, Robot, Integrator, Joints, MismatchConfig, Plant, Surface, TaskFrame, ToolModel};
+pub use safety::Safety;
 pub use segment::{Impedance, Path, Segment, ResolvedSegment};
 
 use serde::{Deserialize, Serialize};
@@ -55,6 +59,9 @@ pub struct Scenario {
     /// Control law.
     #[serde(default)]
     pub controller: Controller,
+    /// What the control computer takes for a fault.
+    #[serde(default)]
+    pub safety: Safety,
     /// Impedance of a segment that does not state its own.
     #[serde(default)]
     pub impedance: Impedance,
@@ -64,6 +71,9 @@ pub struct Scenario {
     /// Bus, cards and tasks; default: Figure 6.1.
     #[serde(default = "crate::builtin::figure_6_1")]
     pub rack: vme::rack::Rack,
+    /// What goes wrong.
+    #[serde(default, rename = "fault", skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<Fault>,
     /// Operating-system processes and the boards in them; default: one per board, recorder and workstation included.
     #[serde(default = "one_process_per_board", rename = "process")]
     pub processes: Vec<Process>,

@@ -1,0 +1,164 @@
+//! From `[[fault]]` to instants: when each fault holds, and what the timing plane has to know of it.
+//!
+//! Every fault has a random stream of its own, so another one beside it does not move it.
+
+use crate::error::Problem;
+use crate::hardware::nanoseconds;
+use crate::model::{Fault, FaultKind, Scenario};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use vme::Ns;
+
+/// Streams of faults begin here; boards use the lower ones.
+const STREAM: u64 = 1 << 32;
+/// A fault that begins more often is refused.
+const MAX_OCCURRENCES: usize = 100_000;
+
+/// One time that a fault holds: in `[from, until)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Occurrence {
+    /// Number of the fault in the scenario.
+    pub fault: usize,
+    /// From this instant …
+    pub from: Ns,
+    /// … up to, but not at, this one; [`Ns::MAX`] = to the end.
+    pub until: Ns,
+}
+
+impl Scenario {
+    /// When each fault holds, in the order of the faults, then of time.
+    pub fn occurrences(&self) -> Vec<Occurrence> {
+        let of = |(fault, stated): (usize, &Fault)| occurrences(fault, stated, self.seed, self.duration_ns());
+        self.faults.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// The faults of bus and processors; [`Occurrence`]s beside them in the same order.
+    pub fn fault_plan(&self) -> (vme::FaultPlan, Vec<Occurrence>) {
+        let (mut plan, mut known) = (vme::FaultPlan::default(), Vec::new());
+        for occurrence in self.occurrences() {
+            // a target that does not exist has been refused
+            if let Ok(Some(kind)) = self.timing_fault(occurrence.fault) {
+                let Occurrence { from: from_ns, until: until_ns, .. } = occurrence;
+                plan.faults.push(vme::Fault { from_ns, until_ns, kind });
+                known.push(occurrence);
+            }
+        }
+        (plan, known)
+    }
+
+    /// What a fault is to the timing plane; `None` for faults of signals.
+    fn timing_fault(&self, fault: usize) -> Result<Option<vme::FaultKind>, Problem> {
+        let Fault { target, kind, amount, .. } = &self.faults[fault];
+        let key = format!("fault.{fault}.target");
+        let rack = &self.rack;
+        let find = |what: &str, names: Vec<&str>| {
+            let place = names.iter().position(|name| name == target);
+            place.map(|i| i as u16).ok_or_else(|| {
+                Problem::new(&key, format!("is `{target}`, expected {what} of the rack: {}", names.join(", ")))
+            })
+        };
+        let only = |expected: &str| match target == expected {
+            true => Ok(()),
+            false => Err(Problem::new(&key, format!("is `{target}`, expected `{expected}` for this kind"))),
+        };
+        Ok(Some(match kind {
+            kind if kind.is_of_force_sensor() => {
+                only("force_sensor")?;
+                return Ok(None);
+            }
+            FaultKind::NoSlave => {
+                vme::FaultKind::NoSlave(find("a slave", rack.slaves.iter().map(|slave| slave.name.as_str()).collect())?)
+            }
+            FaultKind::Starvation => {
+                let timing = vme::Timing::new(rack.clone()).map_err(|error| Problem::new("rack", error.to_string()))?;
+                let names: Vec<String> =
+                    (0..).map_while(|i| timing.master_name(i).map(str::to_owned)).collect();
+                vme::FaultKind::Starvation(find("a master", names.iter().map(String::as_str).collect())?)
+            }
+            FaultKind::StuckBus => {
+                only("bus")?;
+                vme::FaultKind::StuckBus
+            }
+            FaultKind::LostInterrupt => {
+                let names = rack.interrupters.iter().map(|interrupter| interrupter.name.as_str()).collect();
+                vme::FaultKind::LostInterrupt(find("an interrupter", names)?)
+            }
+            FaultKind::CableOut => {
+                let names = rack.adaptors.iter().map(|adaptor| adaptor.name.as_str()).collect();
+                vme::FaultKind::CableOut(find("an adaptor", names)?)
+            }
+            _ => vme::FaultKind::Slow {
+                task: find("a task", rack.tasks.iter().map(|task| task.name.as_str()).collect())?,
+                percent: (amount * 100.0).round() as u32,
+            },
+        }))
+    }
+}
+
+/// Refuses faults that make no sense, each with its key.
+pub(crate) fn check(scenario: &Scenario) -> Result<(), Problem> {
+    for (i, fault) in scenario.faults.iter().enumerate() {
+        let refuse = |key: &str, message: String| Err(Problem::new(format!("fault.{i}.{key}"), message));
+        let time = |key: &str, value: Option<f64>, least: f64| match value {
+            Some(value) if !(least..=1e6).contains(&value) => {
+                refuse(key, format!("is {value}, expected {least} to 1 000 000 s"))
+            }
+            _ => Ok(()),
+        };
+        time("start_s", Some(fault.start_s), 0.0)?;
+        time("duration_s", fault.duration_s, 1e-6)?;
+        time("every_s", fault.every_s, 1e-3)?;
+        time("mean_time_between_s", fault.mean_time_between_s, 1e-3)?;
+        if !(0.0..=1.0).contains(&fault.probability) {
+            return refuse("probability", format!("is {}, expected 0 to 1", fault.probability));
+        }
+        if fault.every_s.is_some() && fault.mean_time_between_s.is_some() {
+            return refuse("every_s", "stands beside mean_time_between_s; state one of them".into());
+        }
+        if (fault.every_s.is_some() || fault.mean_time_between_s.is_some()) && fault.duration_s.is_none() {
+            return refuse("duration_s", "is missing; a fault that comes again must end first".into());
+        }
+        if let (Some(every), Some(duration)) = (fault.every_s, fault.duration_s)
+            && duration >= every
+        {
+            return refuse("duration_s", format!("is {duration}, expected less than every_s = {every}"));
+        }
+        if let Some(axis) = fault.axes.iter().find(|axis| **axis > 5) {
+            return refuse("axes", format!("has {axis}, expected 0 to 5 (force x y z, moment x y z)"));
+        }
+        let least = match fault.kind {
+            FaultKind::Noise => Some(0.0),
+            FaultKind::Slow => Some(0.01),
+            _ => None,
+        };
+        if let Some(least) = least.filter(|least| !(*least..=1e4).contains(&fault.amount)) {
+            return refuse("amount", format!("is {}, expected {least} to 10 000", fault.amount));
+        }
+        scenario.timing_fault(i)?;
+        if occurrences(i, fault, scenario.seed, scenario.duration_ns()).len() >= MAX_OCCURRENCES {
+            return refuse("every_s", format!("makes {MAX_OCCURRENCES} occurrences or more"));
+        }
+    }
+    Ok(())
+}
+
+fn occurrences(fault: usize, stated: &Fault, seed: u64, end: Ns) -> Vec<Occurrence> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(STREAM + fault as u64);
+    // uniform in (0, 1]
+    let mut uniform = || ((rng.next_u64() >> 11) + 1) as f64 / (1_u64 << 53) as f64;
+    let mut found = Vec::new();
+    let mut from = nanoseconds(stated.start_s);
+    while from < end && found.len() < MAX_OCCURRENCES {
+        let until = stated.duration_s.map_or(Ns::MAX, |duration| from + nanoseconds(duration));
+        if uniform() <= stated.probability {
+            found.push(Occurrence { fault, from, until });
+        }
+        from = match (stated.every_s, stated.mean_time_between_s) {
+            (Some(every), _) => from + nanoseconds(every),
+            (None, Some(mean)) => until + nanoseconds(-mean * libm::log(uniform())),
+            (None, None) => break,
+        };
+    }
+    found
+}

@@ -28,6 +28,7 @@ pub(crate) fn render(report: &RunReport, charts: &[Chart]) -> Result<String, Str
         section("The arm and the tool's path", "", &path::draw(report)),
         section("Limits", "", &checks(report)),
         section("Segments", SEGMENTS_NOTE, &segment_tables(report)),
+        section("Faults", FAULTS_NOTE, &fault_tables(report)),
         format!("<section>{}</section>", sweeps(report)),
         section("From sensor to actuator", WATERFALL_NOTE, &waterfalls(report)),
         section("Latency of bus transfers", "From the bus request to the end of the last cycle.", &latencies(report)),
@@ -40,6 +41,8 @@ pub(crate) fn render(report: &RunReport, charts: &[Chart]) -> Result<String, Str
 
 const SEGMENTS_NOTE: &str = "True contact force along the report's axis; mean and rms over the last second; 90 % rise from the \
     first contact, or from the segment's start where the tool touches already.";
+const FAULTS_NOTE: &str = "From a fault's injection to the first event that it caused, and to the begin of a stop (SS2 or graver); \
+    contact force and way of the tool from then to the next fault or the end.";
 const WATERFALL_NOTE: &str = "Where the time goes from what the force sensor felt to the change of the last D/A output, mean of \
     all control jobs, in simulated time. The parts add up to the whole to the nanosecond.";
 const BUS_NOTE: &str = "Simulated time. Bounds are worst cases without faults; “none” where no bound is known.";
@@ -204,6 +207,14 @@ fn sweeps(report: &RunReport) -> String {
         );
     }
     out
+}
+
+fn fault_tables(report: &RunReport) -> String {
+    let of = |variant: &VariantResult| {
+        let rows = table(&faults::HEADINGS, &faults::cells(&variant.faults));
+        format!("<h3>{}</h3>{rows}", escape(&variant.name))
+    };
+    report.variants.iter().filter(|variant| !variant.faults.is_empty()).map(of).collect()
 }
 
 fn latencies(report: &RunReport) -> String {

@@ -10,6 +10,7 @@ mod bus_rows;
 mod chart;
 mod compare;
 mod envelope;
+mod faults;
 mod html;
 mod ideal;
 pub mod latency;
@@ -26,6 +27,7 @@ mod verdict;
 
 pub use accounting::{Accounting, BusAccount, MasterAccount, PartAccount, Spread, TaskAccount, WaterfallAccount};
 pub use compare::{CompareError, ComparedFigure, Comparison, StoredRun};
+pub use faults::FaultRow;
 pub use ledger::{Ledger, PathLatency};
 pub use measures::RunMeasures;
 pub use result::{RunReport, SCHEMA_VERSION, Sweep, SweepPoint, VariantResult, WriteError};

@@ -2,6 +2,7 @@
 
 use crate::accounting::BusAccount;
 use crate::chart::{Curves, charts};
+use crate::faults::{self, FaultRow};
 use crate::ideal::{Ideal, ideal};
 use crate::latency::LatencyRow;
 use crate::ledger::{Ledger, PathLatency};
@@ -42,6 +43,8 @@ pub struct VariantResult {
     pub ideal: Vec<SegmentRow>,
     /// The scenario's limits, applied.
     pub checks: Vec<Check>,
+    /// One row per injected fault.
+    pub faults: Vec<FaultRow>,
     /// Modelled latency per transfer path.
     pub transfers: Vec<PathLatency>,
     /// Transfers that ended in BERR* or time-out.
@@ -170,6 +173,7 @@ impl VariantResult {
             segments: segment_rows,
             ideal: ideal_rows,
             checks,
+            faults: faults::rows(scenario, trace),
             transfers: ledger.paths(),
             transfer_errors: ledger.errors(),
             bus: trace.bus.clone(),

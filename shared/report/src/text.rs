@@ -4,6 +4,7 @@ use crate::accounting::BusAccount;
 use crate::bus_rows::{
     AGE_HEADINGS, MASTER_HEADINGS, TASK_HEADINGS, WATERFALL_HEADINGS, counts, masters, tasks, waterfall,
 };
+use crate::faults;
 use crate::ledger::PathLatency;
 use crate::result::{RunReport, Sweep, VariantResult};
 use crate::segments::SegmentRow;
@@ -27,6 +28,9 @@ pub fn render(report: &RunReport) -> String {
         out += &format!("\n{}\n{}", variant.name, table(&HEADINGS, &segments(&variant.segments)));
         for finding in &variant.findings {
             out += &format!("  {finding}\n");
+        }
+        if !variant.faults.is_empty() {
+            out += &table(&faults::HEADINGS, &faults::cells(&variant.faults));
         }
     }
     let mut shown: Option<&[PathLatency]> = None;

@@ -15,6 +15,7 @@ pub const SCENARIOS: &[(&str, &str)] = &[
     ("one-axis-delay", include_str!("../../scenarios/one-axis-delay.toml")),
     ("one-axis-force-delay", include_str!("../../scenarios/one-axis-force-delay.toml")),
     ("sampled-wall", include_str!("../../scenarios/sampled-wall.toml")),
+    ("failures", include_str!("../../scenarios/failures.toml")),
     ("bus-stress", include_str!("../../scenarios/bus-stress.toml")),
     ("processor-time", include_str!("../../scenarios/processor-time.toml")),
 ];

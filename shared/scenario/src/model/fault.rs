@@ -67,6 +67,27 @@ pub enum FaultKind {
 }
 
 impl FaultKind {
+    /// Its name in a scenario.
+    pub const fn name(self) -> &'static str {
+        use FaultKind::*;
+        match self {
+            Bias => "bias",
+            Drift => "drift",
+            Stuck => "stuck",
+            Noise => "noise",
+            Spike => "spike",
+            Saturation => "saturation",
+            Dropout => "dropout",
+            WireBreak => "wire-break",
+            NoSlave => "no-slave",
+            Starvation => "starvation",
+            StuckBus => "stuck-bus",
+            LostInterrupt => "lost-interrupt",
+            CableOut => "cable-out",
+            Slow => "slow",
+        }
+    }
+
     /// Whether it is a fault of the force sensor's signal.
     pub fn is_of_force_sensor(self) -> bool {
         use FaultKind::*;

@@ -1,0 +1,111 @@
+//! What each injected fault did: when it was seen, what came of it, and what the contact felt.
+//!
+//! A fault's time runs from its injection to the next one's, or to the end of the run.
+
+use crate::trace::{Trace, seconds};
+use messages::{Event, EventKind};
+use scenario::Scenario;
+use serde::Serialize;
+
+/// Names of the control computer's states, by number.
+const STATES: [&str; 5] = ["run", "degraded", "hold (SS2)", "stop (SS1)", "off (STO)"];
+/// State from which the arm is being stopped.
+const HOLD: usize = 2;
+
+/// One injected fault.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FaultRow {
+    /// Number in the scenario's list.
+    pub fault: usize,
+    /// Target.
+    pub target: String,
+    /// Kind.
+    pub kind: String,
+    /// When it began, s.
+    pub injected_s: f64,
+    /// From its begin to the first event that it caused, s; none = not detected.
+    pub detected_after_s: Option<f64>,
+    /// That event.
+    pub detected_by: Option<String>,
+    /// From its begin until the control computer began to stop the arm, s.
+    pub stopping_after_s: Option<f64>,
+    /// Gravest state of the control computer.
+    pub reaction: String,
+    /// Greatest contact force, N, and the one at its begin.
+    pub peak_force_n: f64,
+    /// Contact force at its begin, N.
+    pub force_before_n: f64,
+    /// Greatest distance of the tool from where it was at its begin, m.
+    pub distance_m: f64,
+}
+
+/// A row for each fault that was injected, in the order of time.
+pub fn rows(scenario: &Scenario, trace: &Trace) -> Vec<FaultRow> {
+    let is_injection = |event: &&Event| event.kind == EventKind::FaultInjected as u32;
+    let injections: Vec<&Event> = trace.events.iter().filter(is_injection).collect();
+    let end_of = |i: usize| injections.get(i + 1).map_or(vme::Ns::MAX, |next| next.t);
+    (0..injections.len()).filter_map(|i| row(scenario, trace, injections[i], end_of(i))).collect()
+}
+
+fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Option<FaultRow> {
+    let fault = injected.a as usize;
+    let stated = scenario.faults.get(fault)?;
+    let from = injected.t;
+    let within = |t: vme::Ns| (from..end).contains(&t);
+    let after = |event: &Event| seconds(event.t) - seconds(from);
+    let consequence = |event: &&Event| {
+        let state = event.kind == EventKind::SafetyState as u32 && event.b > event.a;
+        let seen = [EventKind::BusError, EventKind::ForceSaturated, EventKind::WatchdogExpired, EventKind::OverrunTrip];
+        within(event.t) && (state || seen.iter().any(|kind| event.kind == *kind as u32))
+    };
+    let first = trace.events.iter().find(consequence);
+    let states = trace.events.iter().filter(|event| event.kind == EventKind::SafetyState as u32 && within(event.t));
+    let gravest = states.clone().map(|event| event.b as usize).max();
+    let stopping = states.clone().find(|event| event.b as usize >= HOLD);
+    let mut probes = trace.plant.iter().filter(|probe| within(probe.t));
+    let before = probes.clone().next()?;
+    let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let force = |probe: &messages::PlantProbe| size(&probe.contact[..3]);
+    let way = |probe: &messages::PlantProbe| {
+        let moved: [f64; 3] = std::array::from_fn(|i| probe.position[i] - before.position[i]);
+        size(&moved)
+    };
+    let (peak_force_n, distance_m) = probes.fold((0.0f64, 0.0f64), |(peak, distance), probe| {
+        (peak.max(force(probe)), distance.max(way(probe)))
+    });
+    Some(FaultRow {
+        fault,
+        target: stated.target.clone(),
+        kind: stated.kind.name().into(),
+        injected_s: seconds(from),
+        detected_after_s: first.map(after),
+        detected_by: first.and_then(|event| EventKind::from_number(event.kind)).map(|kind| kind.name().into()),
+        stopping_after_s: stopping.map(after),
+        reaction: STATES.get(gravest.unwrap_or(0)).copied().unwrap_or("unknown").into(),
+        peak_force_n,
+        force_before_n: force(before),
+        distance_m,
+    })
+}
+
+/// Headings of the fault table.
+pub(crate) const HEADINGS: [&str; 8] =
+    ["fault", "at s", "detected by", "after ms", "stopping after ms", "reaction", "force before, peak N", "moved mm"];
+
+/// Cells of the fault table.
+pub(crate) fn cells(rows: &[FaultRow]) -> Vec<Vec<String>> {
+    let ms = |after: Option<f64>| after.map_or("–".into(), |after| format!("{:.2}", 1e3 * after));
+    let cells = |row: &FaultRow| {
+        vec![
+            format!("{}: {} of {}", row.fault, row.kind, row.target),
+            format!("{:.4}", row.injected_s),
+            row.detected_by.clone().unwrap_or("undetected".into()),
+            ms(row.detected_after_s),
+            ms(row.stopping_after_s),
+            row.reaction.clone(),
+            format!("{:.1}, {:.1}", row.force_before_n, row.peak_force_n),
+            format!("{:.2}", 1e3 * row.distance_m),
+        ]
+    };
+    rows.iter().map(cells).collect()
+}

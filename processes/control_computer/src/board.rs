@@ -164,7 +164,8 @@ impl ControlComputer {
         }
         let state = self.decide_state(t, now, out);
         let mode = match state {
-            State::Run | State::Degraded | State::Hold => Mode::Law,
+            State::Run | State::Degraded => Mode::Law,
+            State::Hold => Mode::Hold,
             State::Stop => Mode::Brake,
             State::Off => Mode::Free,
         };
@@ -213,7 +214,6 @@ impl ControlComputer {
                 held_jobs: self.sensors.held_jobs(),
                 old_force_jobs: self.sensors.old_force_jobs(),
                 same_force_jobs: self.sensors.same_force_jobs(),
-                saturated_jobs: self.sensors.saturated_jobs(),
                 speed: self.sensors.sensed().qd.amax(),
                 finite: self.finite,
                 hold: self.hold,

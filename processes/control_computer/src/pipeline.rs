@@ -19,6 +19,9 @@ use vme::Ns;
 pub enum Mode {
     /// The law.
     Law,
+    /// The law holds the pose it has been given, blind to the force (SS2): a force that is not to be trusted must not
+    /// move the arm.
+    Hold,
     /// Motors brake the joints: q̈ = −q̇ · [`BRAKING`] (SS1).
     Brake,
     /// Nothing: no torque (STO).
@@ -107,8 +110,9 @@ impl Pipeline {
             torque_limited: 0,
         };
         match mode {
-            Mode::Law => {
-                job.law = self.law.decide(now, sensed, &tool, &contact.fe);
+            Mode::Law | Mode::Hold => {
+                let fe = if mode == Mode::Hold { Spatial::zeros() } else { contact.fe };
+                job.law = self.law.decide(now, sensed, &tool, &fe);
                 job.torque =
                     motion_torque(&arm, &self.drives, &job.law.qdd) + self.drives.friction(&job.law.target_speed);
                 if self.force_feed_forward {
@@ -122,7 +126,7 @@ impl Pipeline {
             Mode::Free => {}
         }
         job.torque_limited = self.drives.saturate(&mut job.torque);
-        if mode == Mode::Law {
+        if matches!(mode, Mode::Law | Mode::Hold) {
             (self.law).carry_on(&job.law, &tool, job.torque_limited != 0, dt);
         } else {
             self.law.leave();

@@ -37,8 +37,6 @@ pub struct Signs {
     pub old_force_jobs: u32,
     /// Jobs in a row in which all force words were those of the job before.
     pub same_force_jobs: u32,
-    /// Jobs in a row in which the force sensor was saturated.
-    pub saturated_jobs: u32,
     /// Largest joint speed (rad/s).
     pub speed: f64,
     /// The torques of the last job were numbers.
@@ -72,9 +70,7 @@ impl Safety {
     pub fn decide(&mut self, now: Ns, signs: &Signs) -> State {
         const TRIP: u32 = drive_status::AMPLIFIER_TRIPPED | drive_status::EMERGENCY_STOP;
         let limits = &self.limits;
-        let blind = signs.held_jobs > limits.max_held_jobs
-            || signs.saturated_jobs > limits.max_saturated_jobs
-            || signs.old_force_jobs > limits.max_old_force_jobs;
+        let blind = signs.held_jobs > limits.max_held_jobs || signs.old_force_jobs > limits.max_old_force_jobs;
         let frozen = limits.max_same_force_jobs > 0 && signs.same_force_jobs > limits.max_same_force_jobs;
         let next = if signs.drive_status & TRIP != 0 || !signs.finite {
             State::Off
@@ -82,7 +78,9 @@ impl Safety {
             match self.state {
                 State::Off if signs.acknowledge => State::Run,
                 State::Off => State::Off,
-                State::Stop if signs.speed < AT_REST || now >= self.since + nanoseconds(limits.stop_time_ms * 1e-3) => State::Off,
+                State::Stop if signs.speed < AT_REST || now >= self.since + nanoseconds(limits.stop_time_ms * 1e-3) => {
+                    State::Off
+                }
                 State::Stop => State::Stop,
                 _ if blind => State::Stop,
                 State::Hold if !signs.acknowledge => State::Hold,
@@ -102,9 +100,16 @@ impl Safety {
 mod tests {
     use super::*;
 
-    const FINE: Signs =
-        Signs { drive_status: 0, held_jobs: 0, old_force_jobs: 0, same_force_jobs: 0, saturated_jobs: 0, speed: 1.0, finite: true, hold: false, acknowledge: false };
-
+    const FINE: Signs = Signs {
+        drive_status: 0,
+        held_jobs: 0,
+        old_force_jobs: 0,
+        same_force_jobs: 0,
+        speed: 1.0,
+        finite: true,
+        hold: false,
+        acknowledge: false,
+    };
 
     fn safety() -> Safety {
         Safety::new(&scenario::Safety { max_same_force_jobs: 10, ..Default::default() })
@@ -116,8 +121,6 @@ mod tests {
         assert_eq!(safety().decide(1, &Signs { old_force_jobs: 21, ..FINE }), State::Stop);
         assert_eq!(safety().decide(1, &Signs { same_force_jobs: 10, ..FINE }), State::Run);
         assert_eq!(safety().decide(1, &Signs { same_force_jobs: 11, ..FINE }), State::Hold);
-        assert_eq!(safety().decide(1, &Signs { saturated_jobs: 3, ..FINE }), State::Run);
-        assert_eq!(safety().decide(1, &Signs { saturated_jobs: 4, ..FINE }), State::Stop);
         let mut any_number = Safety::new(&scenario::Safety::default());
         assert_eq!(any_number.decide(1, &Signs { same_force_jobs: 1000, ..FINE }), State::Run);
     }

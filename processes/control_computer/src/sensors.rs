@@ -11,10 +11,14 @@ use messages::{BusWord, JOINTS};
 use scenario::{ForceFilter, Scenario, nanoseconds};
 use vme::Ns;
 
-/// Errors of the receiver under which its force words mean nothing.
-const FORCE_INVALID: u32 =
-    (force::ERROR_MEMORY | force::ERROR_SENSOR_CHANGE | force::ERROR_BUSY | force::ERROR_CRC | force::ERROR_WATCHDOG)
-        as u32;
+/// Errors of the receiver under which its force words mean nothing. At full scale they mean too little: fed forward, the
+/// clipped force of a bridge that has failed would push the tool into its surface.
+const FORCE_INVALID: u32 = (force::ERROR_SATURATED
+    | force::ERROR_MEMORY
+    | force::ERROR_SENSOR_CHANGE
+    | force::ERROR_BUSY
+    | force::ERROR_CRC
+    | force::ERROR_WATCHDOG) as u32;
 
 /// Bits of the six force words among those that came.
 const FORCE_WORDS: u32 = 0x3F << FORCES;
@@ -53,7 +57,6 @@ pub struct Sensors {
     max_force_age: Ns,
     old_force_jobs: u32,
     same_force_jobs: u32,
-    saturated_jobs: u32,
     status: u32,
 }
 
@@ -87,7 +90,6 @@ impl Sensors {
             max_force_age: force_period_ns + force_delay_ns + nanoseconds(scenario.safety.max_force_age_ms * 1e-3),
             old_force_jobs: 0,
             same_force_jobs: 0,
-            saturated_jobs: 0,
             status: 0,
         })
     }
@@ -156,11 +158,6 @@ impl Sensors {
         self.same_force_jobs
     }
 
-    /// Jobs in a row in which an axis of the force sensor was saturated.
-    pub fn saturated_jobs(&self) -> u32 {
-        self.saturated_jobs
-    }
-
     /// Age of the force sample at `now`: since its filter's output was published. The receiver's counter numbers the
     /// multiples of the filter's period, modulo 2¹⁶; behind a pure delay it numbers the samples that come out.
     pub fn force_age(&self, now: Ns) -> Ns {
@@ -213,10 +210,6 @@ impl Sensors {
         }
         if self.came & FORCE_WORDS == FORCE_WORDS {
             count(&mut self.same_force_jobs, self.sensed.wrench == before);
-        }
-        if self.has(ERRORS) {
-            let saturated = self.words[ERRORS].value & u32::from(force::ERROR_SATURATED) != 0;
-            count(&mut self.saturated_jobs, saturated);
         }
     }
 }
@@ -314,14 +307,15 @@ mod tests {
     }
 
     #[test]
-    fn under_a_receiver_error_the_force_is_held_but_saturation_is_not_such_an_error() {
+    fn under_a_receiver_error_or_saturation_the_force_is_held() {
         let mut sensors = Sensors::new(&scenario(&[])).unwrap();
         let counts = sensors.counts;
         for (job, errors, force, held) in [
             (0, 0, 100.0, 0),
             (1, u32::from(force::ERROR_CRC), 100.0, 1),
             (2, u32::from(force::ERROR_CRC), 100.0, 2),
-            (3, 0x3F, 300.0, 0),
+            (3, 1 << 2, 100.0, 3),
+            (4, 0, 100.0 + 800.0 / 3.0, 0),
         ] {
             give(&mut sensors, job, counts, 0);
             let newtons = f64::from(job) * 100.0 / 3.0 * 2.0 + 100.0;

@@ -62,7 +62,7 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
     let states = trace.events.iter().filter(|event| event.kind == EventKind::SafetyState as u32 && within(event.t));
     let gravest = states.clone().map(|event| event.b as usize).max();
     let stopping = states.clone().find(|event| event.b as usize >= HOLD);
-    let mut probes = trace.plant.iter().filter(|probe| within(probe.t));
+    let probes = trace.plant.iter().filter(|probe| within(probe.t));
     let before = probes.clone().next()?;
     let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let force = |probe: &messages::PlantProbe| size(&probe.contact[..3]);

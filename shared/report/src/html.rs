@@ -5,8 +5,9 @@ use crate::bus_rows::{
     AGE_HEADINGS, MASTER_HEADINGS, TASK_HEADINGS, WATERFALL_HEADINGS, counts, masters, part_name, tasks, waterfall,
 };
 use crate::chart::Chart;
+use crate::faults;
 use crate::path;
-use crate::result::RunReport;
+use crate::result::{RunReport, VariantResult};
 use crate::svg;
 use crate::text::{
     CHECK_HEADINGS, HEADINGS, LATENCY_HEADINGS, check_row, latency_rows, segments, sweep_table, verdict,

@@ -6,10 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Safety {
-    /// Jobs in a row in which a value may be missing (BERR*, or an error of the receiver) before SS1.
+    /// Jobs in a row in which a value may be missing (BERR*, an error of the receiver, a saturated force sensor) before SS1.
     pub max_held_jobs: u32,
-    /// Jobs in a row in which the force sensor may be saturated before SS1.
-    pub max_saturated_jobs: u32,
     /// Age of a force sample, beyond the time between two of its filter's outputs, from which the arm is held (SS2; ms).
     pub max_force_age_ms: f64,
     /// Jobs in a row with a force sample too old before SS1.
@@ -25,7 +23,6 @@ impl Default for Safety {
     fn default() -> Self {
         Safety {
             max_held_jobs: 3,
-            max_saturated_jobs: 3,
             max_force_age_ms: 15.0,
             max_old_force_jobs: 20,
             max_same_force_jobs: 0,

@@ -72,6 +72,20 @@ mod tests {
     }
 
     #[test]
+    fn what_the_command_line_sets_or_varies_holds_in_variants_that_set_it_too() {
+        let delays = |document: &crate::Document| -> Vec<f64> {
+            let variants = document.variants().expect("resolves");
+            variants.iter().map(|(_, scenario)| scenario.encoder_if.delay_ms).collect()
+        };
+        let stated = crate::load("one-axis-delay", &[]).expect("loads");
+        assert!(delays(&stated).iter().any(|delay| *delay != 50.0));
+        let set = crate::load("one-axis-delay", &["encoder_if.delay_ms=50".into()]).expect("loads");
+        assert!(delays(&set).iter().all(|delay| *delay == 50.0));
+        let varied = set.with("encoder_if.delay_ms", toml::Value::Float(55.5)).expect("varies");
+        assert!(delays(&varied).iter().all(|delay| *delay == 55.5));
+    }
+
+    #[test]
     fn every_built_in_scenario_loads_without_a_warning() {
         for (name, _) in SCENARIOS {
             let document = crate::load(name, &[]).unwrap_or_else(|error| panic!("{name}: {error:?}"));

@@ -21,10 +21,18 @@ pub struct Document {
     text: String,
     folder: PathBuf,
     tree: Table,
-    /// Keys that the command line has set, and the words that set them.
-    set: Vec<(String, String)>,
-    /// Keys that are varied and their values: they hold in every variant, whatever it sets itself.
-    varied: Vec<(String, Value)>,
+    /// What the command line has set: holds in every variant, whatever it sets itself.
+    set: Vec<Setting>,
+}
+
+/// A key that the command line has set.
+#[derive(Clone, Debug)]
+struct Setting {
+    /// Key path, elements numbered.
+    key: String,
+    value: Value,
+    /// The words that set it.
+    origin: String,
 }
 
 /// Reads the scenario of that name or path and applies `overrides` (`key.path=value`). The whole of it,
@@ -43,7 +51,7 @@ impl Document {
         };
         let name =
             Path::new(&file).file_stem().map_or_else(|| "scenario".into(), |stem| stem.to_string_lossy().into_owned());
-        let mut document = Document { name, file, text, folder, tree: Table::new(), set: Vec::new(), varied: Vec::new() };
+        let mut document = Document { name, file, text, folder, tree: Table::new(), set: Vec::new() };
         document.tree = document
             .text
             .parse::<Table>()
@@ -51,10 +59,10 @@ impl Document {
         complete_rack(&mut document.tree);
         for setting in settings {
             let origin = format!("--set {setting}");
-            let key = overrides::parse(setting)
-                .and_then(|(key, value)| overrides::set(&mut document.tree, &key, value))
+            let (key, value) = overrides::parse(setting)
+                .and_then(|(key, value)| Ok((overrides::set(&mut document.tree, &key, value.clone())?, value)))
                 .map_err(|problem| from_override(&origin, problem))?;
-            document.set.push((key, origin));
+            document.set.push(Setting { key, value, origin });
         }
         Ok(document)
     }
@@ -79,9 +87,8 @@ impl Document {
                 overrides::set(&mut tree, &key, value)
                     .map_err(|problem| from_override(&format!("variant {}", variant.name), problem))?;
             }
-            for (key, value) in &self.varied {
-                overrides::vary(&mut tree, key, value.clone())
-                    .map_err(|problem| from_override(&format!("{key}={value}"), problem))?;
+            for Setting { key, value, origin } in &self.set {
+                overrides::vary(&mut tree, key, value.clone()).map_err(|problem| from_override(origin, problem))?;
             }
             resolved.push((variant.clone(), self.resolve(&tree, Some(&variant.name))?));
         }
@@ -94,8 +101,7 @@ impl Document {
         let origin = format!("{key}={value}");
         let key =
             overrides::vary(&mut document.tree, key, value.clone()).map_err(|problem| from_override(&origin, problem))?;
-        document.varied.push((key.clone(), value));
-        document.set.push((key, origin));
+        document.set.push(Setting { key, value, origin });
         Ok(document)
     }
 
@@ -118,9 +124,9 @@ impl Document {
 
     /// An error with the line of its key, or of the closest key above it that stands in the text.
     fn locate(&self, problem: Problem, variant: Option<&str>) -> ScenarioError {
-        let set = self.set.iter().rev().find(|(key, _)| is_within(&problem.key, key) || is_within(key, &problem.key));
-        if let Some((_, origin)) = set {
-            return from_override(origin, problem);
+        let concerned = |set: &&Setting| is_within(&problem.key, &set.key) || is_within(&set.key, &problem.key);
+        if let Some(set) = self.set.iter().rev().find(concerned) {
+            return from_override(&set.origin, problem);
         }
         let span = DeTable::parse(&self.text).ok().map(|root| span_of(root.get_ref(), &problem.key));
         match (span, variant) {

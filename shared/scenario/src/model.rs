@@ -10,7 +10,7 @@ mod plant;
 mod safety;
 mod segment;
 
-pub use controller::{Controller, JointLimitTask, Scheme};
+pub use controller::{Controller, JointLimitTask, Scheme, SecondCard};
 pub use fault::{Fault, FaultKind};
 pub use interfaces::{DaIo, EncoderIf, ForceSensorIf, ForceFilter, VelocitySource};
 pub use limit::{Limit, Measure};

@@ -15,8 +15,8 @@ const LENGTH: usize = 64;
 /// No board has a longer program.
 const MAX_OPS: usize = 4096;
 
-/// Spans of a step: longer messages allocate once.
-const SPANS: usize = 16;
+/// Spans in a message: it is worth sending with half of them; longer ones allocate once.
+const SPANS: usize = 64;
 /// Messages of measurements that the chassis may leave unread.
 const TOLD: usize = 512;
 
@@ -126,16 +126,16 @@ impl Line {
         })
     }
 
-    /// Tells the chassis what was measured.
-    pub fn tell(&mut self, spans: &mut Vec<Span>) {
+    /// Tells the chassis what was measured, once it is worth a message or `at_once`.
+    pub fn tell(&mut self, spans: &mut Vec<Span>, at_once: bool) {
         if let Some((sender, seq)) = &mut self.measured
-            && !spans.is_empty()
+            && (spans.len() >= SPANS / 2 || at_once && !spans.is_empty())
         {
             // a chassis that does not keep up counts what it has missed
             let _ = sender.send(&Header { t: 0, seq: *seq, crc: 0, wall_ns: 0 }, spans);
             *seq = seq.wrapping_add(1);
+            spans.clear();
         }
-        spans.clear();
     }
 
     pub fn grant(&self, transfers: &mut Vec<TransferRecord>) -> Result<Option<Grant>, ChannelError> {

@@ -102,7 +102,7 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
             }
             let answer = host.step(&grant, &transfers)?;
             host.take_spans([], &mut spans);
-            line.tell(&mut spans);
+            line.tell(&mut spans, true);
             until = grant.until;
             let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
             line.reply(board, grant.window, &answer)?;
@@ -125,7 +125,7 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
                 if grant.flags & flags::FINISH != 0 {
                     host.take_spans(host.sent().collect::<Vec<_>>(), &mut spans);
                 }
-                line.tell(&mut spans);
+                line.tell(&mut spans, grant.flags & flags::FINISH != 0);
                 let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
                 line.reply(board, grant.window, &answer)?;
                 bells.ring(CHASSIS_BELL);

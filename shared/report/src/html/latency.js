@@ -57,7 +57,7 @@ function plot(id, x, xs, y, curves, path) {
 function draw() {
   for (const old of plots) old.destroy();
   plots = [];
-  const picked = CURVES.map((curve, color) => ({ ...curve, color })).filter((_, i) => boxes[i].checked);
+  const picked = CURVES.filter((_, i) => boxes[i].checked).map((curve, color) => ({ ...curve, color }));
   if (!picked.length) return;
   const of = (values) => picked.map((curve) => ({ ...curve, values: values(curve) }));
   plot("percentiles", "1 / (1 − quantile)", tails, ", µs", of(percentiles));

@@ -10,8 +10,8 @@ use messages::{BOARDS, BoardId, Span, SpanKind};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 
-/// Jobs after which one that has no torque yet is taken never to get one.
-const PATIENCE: u64 = 32;
+/// Jobs after which one that has no torque yet is taken never to get one. Processes tell what they measured every few steps.
+const PATIENCE: u64 = 64;
 /// Steps that are remembered for the notes of long cycles.
 const REMEMBERED: usize = 4096;
 /// Cycles in the list of the longest.

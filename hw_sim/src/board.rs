@@ -30,8 +30,9 @@ pub struct HwSim {
     t: Ns,
     state: State,
     actuation: Actuation,
-    /// Forces in `state` under `actuation`, once they are known.
-    now: Option<Evaluation>,
+    /// Forces in `state` under `actuation`, where `known`.
+    now: Evaluation,
+    known: bool,
     /// Commands whose time has not come.
     pending: Vec<AmplifierCommand>,
     status: u32,
@@ -44,6 +45,7 @@ impl HwSim {
     /// The hardware of a scenario, at rest on its brakes. The message says what cannot be simulated.
     pub fn new(scenario: &Scenario) -> Result<HwSim, String> {
         let (plant, state) = Plant::new(scenario)?;
+        let now = plant.evaluate(&state, &Actuation::SAFE);
         let mut sim = HwSim {
             plant,
             task_frame: scenario.task_frame(),
@@ -53,7 +55,8 @@ impl HwSim {
             t: 0,
             state,
             actuation: Actuation::SAFE,
-            now: None,
+            now,
+            known: true,
             pending: Vec::with_capacity(PENDING),
             status: 0,
             touched: false,
@@ -64,14 +67,17 @@ impl HwSim {
         Ok(sim)
     }
 
-    /// True state at the last committed instant.
+    /// True state at the last committed instant; after a runaway, the one that left its domain.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// Forces in the committed state.
-    fn now(&mut self) -> Evaluation {
-        *self.now.get_or_insert_with(|| self.plant.evaluate(&self.state, &self.actuation))
+    /// Makes `now` the forces in the committed state.
+    fn evaluate(&mut self) {
+        if !self.known {
+            self.now = self.plant.evaluate(&self.state, &self.actuation);
+            self.known = true;
+        }
     }
 
     /// Limit switches, emergency chain and brake contacts in the committed state. The switches sit in the chain.
@@ -99,22 +105,20 @@ impl HwSim {
                 }
             }
             if self.actuation != before {
-                self.now = None;
+                self.known = false;
                 self.status = self.switches();
             }
         }
         self.pending.drain(..due);
     }
 
-    /// Carries the committed state to `t`. False where it leaves its domain; then it stays.
+    /// Carries the committed state to `t`. False where it leaves its domain; then nothing asks for it again.
     fn commit(&mut self, t: Ns, out: &mut Outputs) -> bool {
-        let now = self.now();
-        let before = self.state;
-        integrate::step(&self.plant, self.integrator, &mut self.state, &now, &self.actuation, seconds(t - self.t));
+        self.evaluate();
+        integrate::step(&self.plant, self.integrator, &mut self.state, &self.now, &self.actuation, seconds(t - self.t));
         self.t = t;
-        self.now = None;
+        self.known = false;
         if let Some((joint, value)) = self.state.out_of_domain(self.runaway) {
-            self.state = before;
             self.status |= drive_status::DIVERGED;
             let value = if value.is_finite() { value } else { f64::MAX };
             out.mail.events.push(Event::new(t, EventKind::Diverged, Severity::Error, joint as f64, value));
@@ -126,18 +130,13 @@ impl HwSim {
 
     /// Puts the committed state on the wires.
     fn sample(&mut self, out: &mut Outputs) {
-        let now = self.now();
-        if !self.touched && now.touch.penetration > 0.0 {
+        self.evaluate();
+        let touch = &self.now.touch;
+        if !self.touched && touch.penetration > 0.0 {
             self.touched = true;
-            out.mail.events.push(Event::new(
-                self.t,
-                EventKind::FirstContact,
-                Severity::Ok,
-                now.touch.normal_speed,
-                0.0,
-            ));
+            out.mail.events.push(Event::new(self.t, EventKind::FirstContact, Severity::Ok, touch.normal_speed, 0.0));
         }
-        self.last_sample = self.sample_of(self.t, &self.state, &now);
+        self.last_sample = self.sample_of(self.t, &self.state, &self.now);
         out.mail.plant.push(self.last_sample);
     }
 
@@ -184,12 +183,13 @@ impl HwSim {
 
     /// Probe, and where the committed state is older, sample, at the end of the window.
     fn finish_window(&mut self, until: Ns, out: &mut Outputs) {
-        let mut state = self.state;
-        let mut now = self.now();
-        if self.t < until {
-            let h = seconds(until - self.t);
-            integrate::step(&self.plant, self.integrator, &mut state, &now, &self.actuation, h);
-            now = self.plant.evaluate(&state, &self.actuation);
+        self.evaluate();
+        if self.t == until {
+            self.last_probe = self.probe_of(until, &self.state, &self.now);
+        } else {
+            let (mut state, h) = (self.state, seconds(until - self.t));
+            integrate::step(&self.plant, self.integrator, &mut state, &self.now, &self.actuation, h);
+            let now = self.plant.evaluate(&state, &self.actuation);
             if state.out_of_domain(self.runaway).is_some() {
                 // the next step of the grid will find it too and say so
                 return self.repeat(until, out);
@@ -198,8 +198,8 @@ impl HwSim {
                 self.last_sample = self.sample_of(until, &state, &now);
                 out.mail.plant.push(self.last_sample);
             }
+            self.last_probe = self.probe_of(until, &state, &now);
         }
-        self.last_probe = self.probe_of(until, &state, &now);
         out.mail.plant_probe.push(self.last_probe);
     }
 

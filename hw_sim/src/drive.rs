@@ -2,7 +2,7 @@
 //!
 //! All quantities are at the output side. Rotor inertia, torques and angles are those of the motor times N², N, 1/N.
 
-use crate::friction::{Bristle, JointFriction};
+use crate::friction::{Bristle, JointFriction, within};
 use arm::drives::JointDrive;
 
 /// Natural frequency of a rotor held by its brake, rad/s: the brake's disc and hub are no rigid body either.
@@ -13,6 +13,8 @@ const BRAKE_FREQUENCY: f64 = 300.0;
 pub struct Drive {
     /// N² J_m, kg m².
     pub rotor: f64,
+    /// Its reciprocal.
+    pub mobility: f64,
     /// N.
     pub gear_ratio: f64,
     /// K, Nm/rad.
@@ -56,6 +58,7 @@ impl Drive {
     pub fn new(data: &JointDrive, friction_scale: f64, with_kinematic_error: bool, braked_inertia: f64) -> Drive {
         Drive {
             rotor: data.rotor_inertia_at_output_kg_m2,
+            mobility: 1.0 / data.rotor_inertia_at_output_kg_m2,
             gear_ratio: data.gear_ratio,
             stiffness: data.stiffness_nm_per_rad,
             damping: data.damping_nms_per_rad(),
@@ -71,7 +74,7 @@ impl Drive {
     /// Motor torque for an amplifier input, Nm: current control with saturation.
     #[inline]
     pub fn motor_torque(&self, volts: f64) -> f64 {
-        (volts * self.torque_per_volt).clamp(-self.torque_limit, self.torque_limit)
+        within(volts * self.torque_per_volt, self.torque_limit)
     }
 
     /// Friction and brake at rotor speed `v` (rad/s) while the transmission carries `load` (Nm).

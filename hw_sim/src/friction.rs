@@ -15,28 +15,40 @@ const STICKING_DAMPING_RATIO: f64 = 0.5;
 pub struct Bristle {
     /// Force per deflection.
     pub stiffness: f64,
+    /// Deflection per force; 0 where there is no friction.
+    compliance: f64,
     /// Force per speed while sticking.
     pub damping: f64,
+}
+
+/// `x` cut to ±`limit`, which is not negative.
+#[inline(always)]
+pub(crate) fn within(x: f64, limit: f64) -> f64 {
+    // two instructions; `clamp` first looks for a limit that is no number
+    let below = if x > limit { limit } else { x };
+    if below < -limit { -limit } else { below }
 }
 
 impl Bristle {
     /// A bristle on which `inertia` rings with `STICKING_DAMPING_RATIO`.
     pub fn holding(stiffness: f64, inertia: f64) -> Bristle {
-        Bristle { stiffness, damping: 2.0 * STICKING_DAMPING_RATIO * (stiffness * inertia).sqrt() }
+        Bristle {
+            stiffness,
+            compliance: if stiffness > 0.0 { 1.0 / stiffness } else { 0.0 },
+            damping: 2.0 * STICKING_DAMPING_RATIO * (stiffness * inertia).sqrt(),
+        }
     }
 
     /// The deflection that remains of `deflection` when the bristle carries at most `capacity`.
+    #[inline(always)]
     pub fn held(&self, deflection: f64, capacity: f64) -> f64 {
-        if self.stiffness == 0.0 {
-            return 0.0;
-        }
-        let limit = capacity / self.stiffness;
-        deflection.clamp(-limit, limit)
+        within(deflection, capacity * self.compliance)
     }
 
     /// Friction force against a motion with speed `v`, for a deflection within [`Bristle::held`].
+    #[inline(always)]
     pub fn force(&self, deflection: f64, v: f64, capacity: f64) -> f64 {
-        (self.stiffness * deflection + self.damping * v).clamp(-capacity, capacity)
+        within(self.stiffness * deflection + self.damping * v, capacity)
     }
 }
 
@@ -49,7 +61,8 @@ pub struct JointFriction {
     viscous: f64,
     /// Breakaway over Coulomb friction, less 1.
     stribeck_rise: f64,
-    stribeck_speed: f64,
+    /// s/rad.
+    per_stribeck_speed: f64,
     bristle: Bristle,
 }
 
@@ -67,7 +80,7 @@ impl JointFriction {
             load_part: scale * drive.load_part,
             viscous: scale * drive.viscous_nms_per_rad,
             stribeck_rise: drive.breakaway_ratio - 1.0,
-            stribeck_speed: drive.stribeck_speed_rad_per_s,
+            per_stribeck_speed: 1.0 / drive.stribeck_speed_rad_per_s,
             bristle: Bristle::holding(scale * nominal / drive.presliding_rad, drive.rotor_inertia_at_output_kg_m2),
         }
     }
@@ -78,17 +91,17 @@ impl JointFriction {
     }
 
     /// Largest dry friction at speed `v` (rad/s) while the transmission carries `load` (Nm): breakaway at rest.
-    #[inline]
+    #[inline(always)]
     pub fn capacity(&self, v: f64, load: f64) -> f64 {
         let coulomb = self.coulomb + self.load_part * load.abs();
-        let s = v / self.stribeck_speed;
+        let s = v * self.per_stribeck_speed;
         // beyond six Stribeck speeds the rise is below the last bit
         let rise = if s.abs() < 6.1 { self.stribeck_rise * libm::exp(-s * s) } else { 0.0 };
         coulomb * (1.0 + rise)
     }
 
     /// Torque against the motion (Nm) and the deflection that remains, for a deflection (rad) and speed (rad/s).
-    #[inline]
+    #[inline(always)]
     pub fn torque(&self, deflection: f64, v: f64, load: f64) -> (f64, f64) {
         let capacity = self.capacity(v, load);
         let held = self.bristle.held(deflection, capacity);

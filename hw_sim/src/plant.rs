@@ -183,8 +183,8 @@ impl Plant {
     /// Forces and accelerations in `state` under `actuation`.
     pub fn evaluate(&self, state: &State, actuation: &Actuation) -> Evaluation {
         let arm = ArmState::new(&self.arm, &state.q, &state.qd);
-        let tip = arm.tip_motion();
-        let touch = self.touch(&tip.pose, &tip.twist, state);
+        let (pose, twist) = (arm.pose(), arm.twist());
+        let touch = self.touch(&pose, &twist, state);
         let f_tip = -touch.wrench;
         let motor = JointVector::from_fn(|i, _| self.drives[i].motor_torque(actuation.volts[i]));
         let mut loss = [RotorLoss::default(); DOF];
@@ -197,10 +197,10 @@ impl Plant {
                     let Transmission { on_link, on_rotor, .. } =
                         drive.transmission(state.theta[i], state.theta_dot[i], state.q[i], state.qd[i]);
                     loss[i] = drive.loss(state.presliding[i], state.brake[i], state.theta_dot[i], on_link, braked(i));
-                    theta_ddot[i] = (motor[i] - loss[i].friction - loss[i].brake - on_rotor) / drive.rotor;
+                    theta_ddot[i] = (motor[i] - loss[i].friction - loss[i].brake - on_rotor) * drive.mobility;
                     transmitted[i] = on_link;
                 }
-                arm.aba(&transmitted, &JointVector::zeros(), &f_tip)
+                arm.accelerations(&transmitted, &JointVector::zeros(), &f_tip)
             }
             Joints::Rigid => {
                 let mut rotors = JointVector::zeros();
@@ -210,14 +210,14 @@ impl Plant {
                     driving[i] -= loss[i].friction + loss[i].brake;
                     rotors[i] = drive.rotor;
                 }
-                let qdd = arm.aba(&driving, &rotors, &f_tip);
+                let qdd = arm.accelerations(&driving, &rotors, &f_tip);
                 theta_ddot = qdd;
                 transmitted = driving - rotors.component_mul(&qdd);
                 qdd
             }
         };
-        let acceleration = tip.jacobian * qdd + tip.jdot_qd;
-        Evaluation { qdd, theta_ddot, motor, loss, transmitted, pose: tip.pose, twist: tip.twist, acceleration, touch }
+        let acceleration = arm.tip_acceleration(&qdd);
+        Evaluation { qdd, theta_ddot, motor, loss, transmitted, pose, twist, acceleration, touch }
     }
 
     fn touch(&self, pose: &Pose, twist: &Spatial, state: &State) -> Touch {

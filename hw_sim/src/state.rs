@@ -46,18 +46,13 @@ impl State {
 
     /// First joint, with its value, that is not finite or moves faster than `speed_limit` (rad/s).
     pub fn out_of_domain(&self, speed_limit: f64) -> Option<(usize, f64)> {
-        for i in 0..arm::DOF {
-            for speed in [self.qd[i], self.theta_dot[i]] {
-                if speed.is_nan() || speed.abs() > speed_limit {
-                    return Some((i, speed));
-                }
-            }
-            for angle in [self.q[i], self.theta[i]] {
-                if !angle.is_finite() {
-                    return Some((i, angle));
-                }
-            }
+        let limits =
+            [(&self.qd, speed_limit), (&self.theta_dot, speed_limit), (&self.q, f64::MAX), (&self.theta, f64::MAX)];
+        // without a branch for each: what is no number is not within a limit either
+        let within = limits.iter().fold(true, |all, (v, limit)| v.iter().fold(all, |all, x| all & (x.abs() <= *limit)));
+        if within {
+            return None;
         }
-        None
+        (0..arm::DOF).find_map(|i| limits.iter().find(|(v, limit)| !(v[i].abs() <= *limit)).map(|(v, _)| (i, v[i])))
     }
 }

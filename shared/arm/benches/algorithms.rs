@@ -4,8 +4,7 @@
 //!     cargo bench -p arm            # the table beside Pinocchio's: scripts/reference/bench_outside.py, same names
 
 use arm::{
-    ArmModel, ArmState, JointVector, Spatial, aba, crba, forward_kinematics, jacobian, jdot_qd,
-    rnea, tip_motion,
+    ArmModel, ArmState, JointVector, Spatial, aba, crba, forward_kinematics, jacobian, jdot_qd, rnea, tip_motion,
 };
 use std::hint::black_box;
 use std::time::Instant;
@@ -25,24 +24,18 @@ fn states() -> Vec<State> {
     let mut seed = 1_u64;
     let mut draw = move |scale: f64| {
         JointVector::from_fn(|_, _| {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             ((seed >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0) * scale
         })
     };
-    (0..STATES)
-        .map(|_| State {
-            q: draw(3.1),
-            qd: draw(2.0),
-            x: draw(5.0),
-        })
-        .collect()
+    (0..STATES).map(|_| State { q: draw(3.1), qd: draw(2.0), x: draw(5.0) }).collect()
 }
 
 fn bench<T>(name: &str, states: &[State], call: impl Fn(&State) -> T) {
     let mut fastest = f64::INFINITY;
-    for _ in 0..BATCHES {
+    // under callgrind, which counts instructions, a few are enough
+    let batches = std::env::var("BATCHES").map_or(BATCHES, |n| n.parse().expect("a number"));
+    for _ in 0..batches {
         let start = Instant::now();
         for k in 0..CALLS {
             black_box(call(black_box(&states[k % STATES])));
@@ -63,8 +56,12 @@ fn main() {
     bench("tip_motion", &states, |s| tip_motion(&model, &s.q, &s.qd));
     bench("rnea", &states, |s| rnea(&model, &s.q, &s.qd, &s.x));
     bench("crba", &states, |s| crba(&model, &s.q));
-    bench("aba", &states, |s| {
-        aba(&model, &s.q, &s.qd, &s.x, &none, &free)
+    bench("aba", &states, |s| aba(&model, &s.q, &s.qd, &s.x, &none, &free));
+    // the same by the mass matrix, behind the tip's motion: what a plant step asks of the model
+    bench("tip+fd", &states, |s| {
+        let state = ArmState::new(&model, &s.q, &s.qd);
+        let tip = state.tip_motion();
+        state.accelerations(&s.x, &none, &tip.twist)
     });
     // tip motion, then torques for accelerations that depend on it: what a control step asks of the model
     bench("tip+rnea", &states, |s| {

@@ -1,46 +1,52 @@
 //! Mass matrix by the composite-rigid-body algorithm.
 //!
-//! Links beyond a joint are merged into one body, kept in base axes at the joint's origin; turning the joint at unit
-//! acceleration gives that body a momentum rate, whose moment about each earlier axis is an entry of the matrix.
+//! Links beyond a joint are merged into one body about the tip; turning the joint at unit acceleration gives that body a
+//! momentum rate, whose component along each earlier axis is an entry of the matrix.
 
-use crate::kinematics::Frames;
+use crate::bodies::Bodies;
+use crate::kinematics::{Frames, Screws};
+use crate::lanes::{Lanes, PAIRS, Pair, lane, sum_from_tip};
 use crate::model::ArmModel;
-use crate::small::{Sym3, V3};
+use crate::small::V3;
 use crate::{DOF, JointMatrix, JointVector};
 
 /// Mass matrix M(q) (kg m²), symmetric to the last bit.
 pub fn crba(model: &ArmModel, q: &JointVector) -> JointMatrix {
     match &model.slide {
         Some(slide) => slide.crba(),
-        None => crba_in(model, &Frames::new(model, q)),
+        None => crba_in(model, &Screws::new(&Frames::new(model, q))),
     }
 }
 
 #[inline(always)]
-pub(crate) fn crba_in(model: &ArmModel, frames: &Frames) -> JointMatrix {
-    let mut mass_matrix = JointMatrix::zeros();
-    let (mut m, mut h, mut inertia) = (0.0, V3::ZERO, Sym3::default());
-    for i in (0..DOF).rev() {
-        let (r, body) = (&frames.r[i], &model.joints[i].body);
-        if i + 1 < DOF {
-            let d = frames.o[i + 1] - frames.o[i];
-            inertia = inertia + Sym3::shift(d, h + d * (0.5 * m));
-            h += d * m;
-        }
-        inertia = inertia + body.i.rotated(*r);
-        h += *r * body.h;
-        m += body.m;
+pub(crate) fn crba_in(model: &ArmModel, screws: &Screws) -> JointMatrix {
+    let rows = mass_rows(screws, Bodies::new(model, screws));
+    JointMatrix::from_fn(|i, j| lane(&rows[i.min(j)], i.max(j)))
+}
 
-        let z = r.z;
-        let p = z.cross(h);
-        let mut l = inertia * z;
-        mass_matrix[(i, i)] = z.dot(l);
-        for j in (0..i).rev() {
-            l += (frames.o[j + 1] - frames.o[j]).cross(p);
-            let entry = frames.r[j].z.dot(l);
-            mass_matrix[(i, j)] = entry;
-            mass_matrix[(j, i)] = entry;
+/// Rows of M from the diagonal on; what stands before the diagonal, or in the tip's lane, means nothing.
+#[inline(always)]
+pub(crate) fn mass_rows(screws: &Screws, links: Bodies) -> [[Pair; PAIRS]; DOF] {
+    let mut composite = links;
+    sum_from_tip(&mut composite.mass);
+    sum_from_tip(&mut composite.first);
+    sum_from_tip(&mut composite.second);
+    // momentum rates of the composites about the tip, each for its own joint's unit acceleration
+    let mut p = [V3::<Pair>::default(); PAIRS];
+    let mut l = [V3::<Pair>::default(); PAIRS];
+    for k in 0..PAIRS {
+        let (s, z) = (screws.s[k], screws.r[k].z);
+        let (m, h, i) = (composite.mass[k], composite.first[k], composite.second[k]);
+        p[k] = s * m + z.cross(h);
+        l[k] = z * i.trace() - i * z + h.cross(s);
+    }
+    let mut rows = [[Pair::default(); PAIRS]; DOF];
+    for j in 0..DOF {
+        let (s, z) = (lane(&screws.s, j), lane(&screws.r, j).z);
+        let (s, z) = (V3::pair(s, s), V3::pair(z, z));
+        for k in 0..PAIRS {
+            rows[j][k] = s.dot(p[k]) + z.dot(l[k]);
         }
     }
-    mass_matrix
+    rows
 }

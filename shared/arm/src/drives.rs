@@ -92,8 +92,7 @@ pub enum DriveError {
 impl DriveData {
     /// Drives of the built-in REDIESTRO (surrogate).
     pub fn rediestro() -> DriveData {
-        DriveData::from_toml(DriveData::rediestro_toml())
-            .expect("the built-in drive data is tested")
+        DriveData::from_toml(DriveData::rediestro_toml()).expect("the built-in drive data is tested")
     }
 
     /// Text of the built-in drive data.
@@ -109,16 +108,12 @@ impl DriveData {
             joint: Vec<JointDrive>,
         }
         let format = |path: String, message: String| DriveError::Format { path, message };
-        let toml = toml::Deserializer::parse(text)
-            .map_err(|e| format("the file".into(), e.to_string()))?;
-        let file: File = serde_path_to_error::deserialize(toml)
-            .map_err(|e| format(e.path().to_string(), e.inner().to_string()))?;
+        let toml = toml::Deserializer::parse(text).map_err(|e| format("the file".into(), e.to_string()))?;
+        let file: File =
+            serde_path_to_error::deserialize(toml).map_err(|e| format(e.path().to_string(), e.inner().to_string()))?;
         file.joint.iter().try_for_each(JointDrive::check)?;
         let found = file.joint.len();
-        let joints = file
-            .joint
-            .try_into()
-            .map_err(|_| DriveError::JointCount { found })?;
+        let joints = file.joint.try_into().map_err(|_| DriveError::JointCount { found })?;
         Ok(DriveData { joints })
     }
 
@@ -141,8 +136,7 @@ impl DriveData {
 impl JointDrive {
     /// D = 2 ζ √(K N² J_m): damper beside the spring (Nm s/rad).
     pub fn damping_nms_per_rad(&self) -> f64 {
-        2.0 * self.damping_ratio
-            * (self.stiffness_nm_per_rad * self.rotor_inertia_at_output_kg_m2).sqrt()
+        2.0 * self.damping_ratio * (self.stiffness_nm_per_rad * self.rotor_inertia_at_output_kg_m2).sqrt()
     }
 
     /// Coulomb friction while the spring carries `load_nm` (Nm).
@@ -157,9 +151,7 @@ impl JointDrive {
 
     /// Kinematic error of the gear at the output (rad) for a motor angle in rad.
     pub fn kinematic_error(&self, motor_rad: f64) -> f64 {
-        let waves = KINEMATIC_ERROR_HARMONICS
-            .iter()
-            .zip(&self.kinematic_error_phase_rad);
+        let waves = KINEMATIC_ERROR_HARMONICS.iter().zip(&self.kinematic_error_phase_rad);
         let mut error = 0.0;
         for (amplitude, (harmonic, phase)) in self.kinematic_error_rad.iter().zip(waves) {
             error += amplitude * libm::sin(harmonic * motor_rad + phase);
@@ -174,33 +166,19 @@ impl JointDrive {
 
     fn check(&self) -> Result<(), DriveError> {
         let positive = |key, value| self.require(key, value, value > 0.0, "a number above 0");
-        let not_negative =
-            |key, value| self.require(key, value, value >= 0.0, "a number of at least 0");
+        let not_negative = |key, value| self.require(key, value, value >= 0.0, "a number of at least 0");
         positive("gear_ratio", self.gear_ratio)?;
-        positive(
-            "rotor_inertia_at_output_kg_m2",
-            self.rotor_inertia_at_output_kg_m2,
-        )?;
+        positive("rotor_inertia_at_output_kg_m2", self.rotor_inertia_at_output_kg_m2)?;
         positive("stiffness_nm_per_rad", self.stiffness_nm_per_rad)?;
         not_negative("damping_ratio", self.damping_ratio)?;
         not_negative("coulomb_nm", self.coulomb_nm)?;
         not_negative("viscous_nms_per_rad", self.viscous_nms_per_rad)?;
         let ratio = self.breakaway_ratio;
-        self.require(
-            "breakaway_ratio",
-            ratio,
-            ratio >= 1.0,
-            "a number of at least 1",
-        )?;
+        self.require("breakaway_ratio", ratio, ratio >= 1.0, "a number of at least 1")?;
         positive("stribeck_speed_rad_per_s", self.stribeck_speed_rad_per_s)?;
         // above 1 a loaded joint could not be moved at all
         let load = self.load_part;
-        self.require(
-            "load_part",
-            load,
-            (0.0..1.0).contains(&load),
-            "a number from 0 to below 1",
-        )?;
+        self.require("load_part", load, (0.0..1.0).contains(&load), "a number from 0 to below 1")?;
         positive("presliding_rad", self.presliding_rad)?;
         for amplitude in self.kinematic_error_rad {
             not_negative("kinematic_error_rad", amplitude)?;
@@ -214,22 +192,11 @@ impl JointDrive {
         positive("encoder_lines", f64::from(self.encoder_lines))
     }
 
-    fn require(
-        &self,
-        key: &'static str,
-        value: f64,
-        holds: bool,
-        expected: &'static str,
-    ) -> Result<(), DriveError> {
+    fn require(&self, key: &'static str, value: f64, holds: bool, expected: &'static str) -> Result<(), DriveError> {
         if holds && value.is_finite() {
             return Ok(());
         }
-        Err(DriveError::Value {
-            joint: self.name.clone(),
-            key,
-            value,
-            expected,
-        })
+        Err(DriveError::Value { joint: self.name.clone(), key, value, expected })
     }
 }
 
@@ -241,12 +208,7 @@ mod tests {
     #[test]
     fn ten_volts_ask_for_the_torque_limit_and_the_brake_holds_more_than_the_drive_gives() {
         for joint in DriveData::rediestro().joints {
-            assert_eq!(
-                joint.amplifier_nm_per_v * 10.0,
-                joint.torque_limit_nm,
-                "{}",
-                joint.name
-            );
+            assert_eq!(joint.amplifier_nm_per_v * 10.0, joint.torque_limit_nm, "{}", joint.name);
             assert!(joint.brake_nm > joint.torque_limit_nm, "{}", joint.name);
         }
     }
@@ -261,33 +223,23 @@ mod tests {
     }
 
     #[test]
-    fn slow_friction_reaches_30_percent_of_the_gravity_torque_in_some_posture_but_no_more_at_the_table_top()
-     {
+    fn slow_friction_reaches_30_percent_of_the_gravity_torque_in_some_posture_but_no_more_at_the_table_top() {
         let (model, drives) = (ArmModel::rediestro(), DriveData::rediestro());
-        let q = JointVector::from(
-            [69.2, -15.3, -72.0, -132.4, 159.8, 64.7, 104.0].map(f64::to_radians),
-        );
+        let q = JointVector::from([69.2, -15.3, -72.0, -132.4, 159.8, 64.7, 104.0].map(f64::to_radians));
         let g = gravity_torque(&model, &q);
         let shares: Vec<f64> = (0..DOF)
             .filter(|&i| g[i].abs() >= 15.0)
             .map(|i| drives.joints[i].coulomb_at_load_nm(g[i]) / g[i].abs())
             .collect();
-        let (least, most) = shares
-            .iter()
-            .fold((1.0_f64, 0.0_f64), |(a, b), &s| (a.min(s), b.max(s)));
+        let (least, most) = shares.iter().fold((1.0_f64, 0.0_f64), |(a, b), &s| (a.min(s), b.max(s)));
         assert_eq!(shares.len(), 4, "joints 2 to 5 carry the arm");
-        assert!(
-            (0.12..0.14).contains(&least) && (0.28..0.32).contains(&most),
-            "{shares:?}"
-        );
+        assert!((0.12..0.14).contains(&least) && (0.28..0.32).contains(&most), "{shares:?}");
     }
 
     #[test]
     fn kinematic_error_amplitudes_lie_between_a_fifth_of_a_milliradian_and_a_milliradian() {
         for joint in DriveData::rediestro().joints {
-            let peak = (0..6283)
-                .map(|k| joint.kinematic_error(f64::from(k) * 1e-3).abs())
-                .fold(0.0, f64::max);
+            let peak = (0..6283).map(|k| joint.kinematic_error(f64::from(k) * 1e-3).abs()).fold(0.0, f64::max);
             assert!((2e-4..1e-3).contains(&peak), "{}: {peak}", joint.name);
         }
     }
@@ -295,45 +247,17 @@ mod tests {
     #[test]
     fn a_bad_value_is_refused_with_joint_key_and_expectation() {
         let text = |from: &str, to: &str| DriveData::rediestro_toml().replacen(from, to, 1);
-        let error =
-            DriveData::from_toml(&text("coulomb_nm = 4.0", "coulomb_nm = -4.0")).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "drive data of 'joint_3': coulomb_nm = -4, expected a number of at least 0"
-        );
-        let error = DriveData::from_toml(&text(
-            "stiffness_nm_per_rad = 20000.0",
-            "stiffness_nm_per_rad = nan",
-        ));
-        assert!(
-            error
-                .unwrap_err()
-                .to_string()
-                .contains("'joint_4': stiffness_nm_per_rad = NaN")
-        );
-        let error = DriveData::from_toml(&text("gear_ratio = 120.0", "gear_ratios = 120.0"))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("joint[3]") && error.contains("gear_ratios"),
-            "{error}"
-        );
-        let error = DriveData::from_toml(&text("brake_nm = 350.0\n", ""))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("joint[0]") && error.contains("brake_nm"),
-            "{error}"
-        );
+        let error = DriveData::from_toml(&text("coulomb_nm = 4.0", "coulomb_nm = -4.0")).unwrap_err();
+        assert_eq!(error.to_string(), "drive data of 'joint_3': coulomb_nm = -4, expected a number of at least 0");
+        let error = DriveData::from_toml(&text("stiffness_nm_per_rad = 20000.0", "stiffness_nm_per_rad = nan"));
+        assert!(error.unwrap_err().to_string().contains("'joint_4': stiffness_nm_per_rad = NaN"));
+        let error = DriveData::from_toml(&text("gear_ratio = 120.0", "gear_ratios = 120.0")).unwrap_err().to_string();
+        assert!(error.contains("joint[3]") && error.contains("gear_ratios"), "{error}");
+        let error = DriveData::from_toml(&text("brake_nm = 350.0\n", "")).unwrap_err().to_string();
+        assert!(error.contains("joint[0]") && error.contains("brake_nm"), "{error}");
         let seven = DriveData::rediestro_toml();
         let last = seven.rfind("[[joint]]").expect("joints");
-        assert_eq!(
-            DriveData::from_toml(&seven[..last]),
-            Err(DriveError::JointCount { found: 6 })
-        );
-        assert!(matches!(
-            DriveData::from_toml("\u{1}noise"),
-            Err(DriveError::Format { .. })
-        ));
+        assert_eq!(DriveData::from_toml(&seven[..last]), Err(DriveError::JointCount { found: 6 }));
+        assert!(matches!(DriveData::from_toml("\u{1}noise"), Err(DriveError::Format { .. })));
     }
 }

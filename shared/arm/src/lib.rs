@@ -17,15 +17,20 @@
 //! | `rotation` | logarithm, exponential, orientation error, roll-pitch-yaw |
 
 mod aba;
+mod bodies;
+mod chain;
 mod crba;
 pub mod drives;
+mod forward;
 mod inertia;
 mod kinematics;
+mod lanes;
 mod mismatch;
 mod model;
 mod reach;
 mod rnea;
 pub mod rotation;
+mod sincos;
 mod slide;
 mod small;
 mod state;

@@ -52,9 +52,7 @@ impl Mismatch {
 impl ArmModel {
     /// An arm drawn around this one.
     pub fn perturbed(&self, mismatch: &Mismatch, seed: u64) -> ArmModel {
-        let mut draw = Normal {
-            rng: ChaCha8Rng::seed_from_u64(seed),
-        };
+        let mut draw = Normal { rng: ChaCha8Rng::seed_from_u64(seed) };
         let mut arm = self.clone();
         for joint in &mut arm.joints {
             joint.p += draw.vector(mismatch.origin_m);
@@ -64,17 +62,12 @@ impl ArmModel {
         arm.tip_p += draw.vector(mismatch.origin_m);
         arm.tip_r = draw.turn(mismatch.orientation_rad) * arm.tip_r;
         let tilt = mismatch.gravity_direction_rad;
-        let tilt: M3 = rotation::exp(&Vector3::new(
-            draw.normal() * tilt,
-            draw.normal() * tilt,
-            0.0,
-        ))
-        .into();
+        let tilt: M3 = rotation::exp(&Vector3::new(draw.normal() * tilt, draw.normal() * tilt, 0.0)).into();
         arm.gravity = tilt * arm.gravity * draw.factor(mismatch.gravity_ratio);
         if let Some(slide) = &mut arm.slide {
             slide.mass *= draw.factor(mismatch.mass_ratio);
         }
-        arm
+        arm.settled()
     }
 }
 
@@ -111,31 +104,23 @@ impl Normal {
         let com = body.com() + self.vector(mismatch.com_m);
         let half = 0.5 * mismatch.inertia_ratio;
         let stretch = [self.factor(half), self.factor(half), self.factor(half)];
-        Inertia::at_com(
-            body.m * mass,
-            com,
-            stretched(body.about_com(), stretch) * mass,
-        )
+        Inertia::at_com(body.m * mass, com, stretched(body.about_com(), stretch) * mass)
     }
 }
 
 /// The tensor of a body whose mass is spread by the factors `s` along the axes: its second moments ½ tr(I)·1 − I become
 /// `diag(s)` times themselves times `diag(s)`.
 fn stretched(tensor: Sym3, s: [f64; 3]) -> Sym3 {
-    let half = 0.5 * (tensor.xx + tensor.yy + tensor.zz);
-    let (x, y, z) = (
-        (half - tensor.xx) * s[0] * s[0],
-        (half - tensor.yy) * s[1] * s[1],
-        (half - tensor.zz) * s[2] * s[2],
-    );
+    let i = tensor.second_moments();
     Sym3 {
-        xx: y + z,
-        yy: x + z,
-        zz: x + y,
-        xy: tensor.xy * s[0] * s[1],
-        xz: tensor.xz * s[0] * s[2],
-        yz: tensor.yz * s[1] * s[2],
+        xx: i.xx * s[0] * s[0],
+        yy: i.yy * s[1] * s[1],
+        zz: i.zz * s[2] * s[2],
+        xy: i.xy * s[0] * s[1],
+        xz: i.xz * s[0] * s[2],
+        yz: i.yz * s[1] * s[2],
     }
+    .complement()
 }
 
 #[cfg(test)]
@@ -160,10 +145,7 @@ mod tests {
         let same = model.perturbed(&Mismatch::default(), 7);
         let q = JointVector::repeat(0.4);
         assert!((gravity_torque(&same, &q) - gravity_torque(&model, &q)).amax() < 1e-12);
-        assert_eq!(
-            forward_kinematics(&same, &q),
-            forward_kinematics(&model, &q)
-        );
+        assert_eq!(forward_kinematics(&same, &q), forward_kinematics(&model, &q));
     }
 
     #[test]
@@ -180,31 +162,19 @@ mod tests {
             let arm = model.perturbed(&MUCH, seed);
             for i in 0..7 {
                 let body = arm.link_inertia(i);
-                assert!(
-                    body.mass > 0.0 && is_physical(&body.tensor),
-                    "seed {seed} link {i}"
-                );
+                assert!(body.mass > 0.0 && is_physical(&body.tensor), "seed {seed} link {i}");
             }
-            assert!(
-                crba(&arm, &JointVector::repeat(0.3)).cholesky().is_some(),
-                "seed {seed}"
-            );
+            assert!(crba(&arm, &JointVector::repeat(0.3)).cholesky().is_some(), "seed {seed}");
         }
     }
 
     #[test]
     fn drawn_errors_have_the_deviation_that_was_asked_for() {
         let model = ArmModel::rediestro();
-        let only_mass = Mismatch {
-            mass_ratio: 0.1,
-            ..Mismatch::default()
-        };
+        let only_mass = Mismatch { mass_ratio: 0.1, ..Mismatch::default() };
         let mut squares = 0.0;
         for seed in 0..300 {
-            let ratio = model
-                .perturbed(&only_mass, seed)
-                .link_masses()
-                .component_div(&model.link_masses());
+            let ratio = model.perturbed(&only_mass, seed).link_masses().component_div(&model.link_masses());
             squares += ratio.map(|r| libm::log(r) * libm::log(r)).sum();
         }
         let deviation = (squares / 2100.0).sqrt();

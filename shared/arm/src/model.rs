@@ -1,8 +1,10 @@
 //! Constant data of an arm: where the joints sit, what the links weigh, what they are allowed to do.
 //!
 //! Joint frame i has its origin on joint axis i and its z along that axis, whatever the URDF's axis is: so every joint
-//! turns about z and the algorithms need no case distinction. Link i is everything that moves rigidly with joint i.
+//! turns about z and the algorithms need no case distinction. Link i is everything that moves rigidly with joint i. What
+//! the algorithms read is derived from it (`chain`).
 
+use crate::chain::Chain;
 use crate::inertia::{BodyInertia, Inertia};
 use crate::slide::Slide;
 use crate::small::{M3, V3, v3};
@@ -39,6 +41,8 @@ pub struct ArmModel {
     pub(crate) held: Vec<String>,
     /// Set for the one-axis test arm, which replaces the chain.
     pub(crate) slide: Option<Slide>,
+    /// The same constants as the algorithms read them: made anew by [`ArmModel::settled`].
+    pub(crate) chain: Chain,
 }
 
 /// A tool bolted to the tip.
@@ -56,8 +60,7 @@ impl ArmModel {
     /// The built-in REDIESTRO: kinematics from its Denavit–Hartenberg table, everything else a surrogate (the URDF says so).
     pub fn rediestro() -> ArmModel {
         static MODEL: LazyLock<ArmModel> = LazyLock::new(|| {
-            ArmModel::from_urdf(ArmModel::rediestro_urdf(), None, "tool")
-                .expect("the built-in URDF is tested")
+            ArmModel::from_urdf(ArmModel::rediestro_urdf(), None, "tool").expect("the built-in URDF is tested")
         });
         MODEL.clone()
     }
@@ -76,22 +79,11 @@ impl ArmModel {
     /// A one-axis test arm: joint 1 is a frictionless slide along base z that carries `mass_kg` (position in m, force in
     /// N), its tip at (0, 0, q₁) with the axes of the base. Joints 2 to 7 turn unit inertias that move nothing. No gravity.
     pub fn slide(mass_kg: f64) -> ArmModel {
-        let limit =
-            |slide: f64, rest: f64| JointVector::from_fn(|i, _| if i == 0 { slide } else { rest });
-        let joint = Joint {
-            r: M3::IDENTITY,
-            p: V3::ZERO,
-            body: Inertia::default(),
-        };
+        let limit = |slide: f64, rest: f64| JointVector::from_fn(|i, _| if i == 0 { slide } else { rest });
+        let joint = Joint { r: M3::IDENTITY, p: V3::ZERO, body: Inertia::default() };
         ArmModel {
             name: "slide".into(),
-            joint_names: std::array::from_fn(|i| {
-                if i == 0 {
-                    "slide".into()
-                } else {
-                    format!("idle_{}", i + 1)
-                }
-            }),
+            joint_names: std::array::from_fn(|i| if i == 0 { "slide".into() } else { format!("idle_{}", i + 1) }),
             joints: std::array::from_fn(|_| joint.clone()),
             tip_r: M3::IDENTITY,
             tip_p: V3::ZERO,
@@ -102,7 +94,14 @@ impl ArmModel {
             effort: limit(1e4, 1e3),
             held: Vec::new(),
             slide: Some(Slide { mass: mass_kg }),
+            chain: Chain::default(),
         }
+    }
+
+    /// After any change of joints, links or tip.
+    pub(crate) fn settled(mut self) -> ArmModel {
+        self.chain = Chain::of(&self);
+        self
     }
 
     /// Name given in the URDF.
@@ -175,19 +174,17 @@ impl ArmModel {
             Some(slide) => slide.mass += tool.mass,
             None => {
                 let body = Inertia::at_com(tool.mass, tool.com.into(), tool.inertia.into());
-                self.joints[6].body = self.joints[6]
-                    .body
-                    .plus(&body.moved(self.tip_r, self.tip_p));
+                self.joints[6].body = self.joints[6].body.plus(&body.moved(self.tip_r, self.tip_p));
             }
         }
-        self
+        self.settled()
     }
 
     /// The same arm with the tip frame moved: axes `r` and origin `p` (m) in the present tip frame.
     pub fn with_tip(mut self, r: Matrix3<f64>, p: Vector3<f64>) -> ArmModel {
         self.tip_p += self.tip_r * V3::from(p);
         self.tip_r = self.tip_r * M3::from(r);
-        self
+        self.settled()
     }
 }
 

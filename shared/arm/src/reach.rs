@@ -29,9 +29,7 @@ impl ArmModel {
         if self.is_slide() {
             return self.upper[0];
         }
-        (0..32)
-            .map(|k| self.ascend(self.scattered(k)))
-            .fold(0.0, f64::max)
+        (0..32).map(|k| self.ascend(self.scattered(k))).fold(0.0, f64::max)
     }
 
     fn limits(&self, i: usize) -> (f64, f64) {
@@ -72,7 +70,7 @@ impl ArmModel {
 
     fn stretch(&self, q: &JointVector) -> f64 {
         let frames = Frames::new(self, q);
-        let d = frames.tip - frames.o[1];
+        let d = V3::from(frames.o[DOF]) - V3::from(frames.o[1]);
         d.dot(d).sqrt()
     }
 }
@@ -82,8 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rediestro_reaches_further_than_any_sampled_posture_but_not_further_than_its_links_are_long()
-    {
+    fn rediestro_reaches_further_than_any_sampled_posture_but_not_further_than_its_links_are_long() {
         let model = ArmModel::rediestro();
         let reach = model.reach();
         assert!(reach < model.reach_bound());

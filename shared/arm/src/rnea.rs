@@ -1,24 +1,36 @@
 //! Inverse dynamics by recursive Newton–Euler: the joint torques that a motion needs.
 //!
-//! Gravity enters as an upward acceleration of the base. All vectors are in base axes; accelerations and moments are
-//! taken at the joint origins, where the links' inertias are given.
+//! Gravity enters as an upward acceleration of the base. All vectors are in base axes and refer to the tip, so the
+//! outward recursion is a sum from the base and the inward one a sum from the tip.
 
-use crate::kinematics::Frames;
+use crate::bodies::Bodies;
+use crate::kinematics::{Frames, Motion, Screws};
+use crate::lanes::{Lanes, PAIRS, Pair, joints_of, pairs_of, sum_from_base, sum_from_tip};
 use crate::model::ArmModel;
-use crate::small::{M3, V3};
-use crate::{DOF, JointVector};
+use crate::small::{V3, v3};
+use crate::{JointVector, Spatial};
 
 /// Joint torques (Nm) for angles, speeds and accelerations (rad, rad/s, rad/s²): M(q) q̈ + C(q, q̇) q̇ + g(q).
 pub fn rnea(model: &ArmModel, q: &JointVector, qd: &JointVector, qdd: &JointVector) -> JointVector {
     match &model.slide {
         Some(slide) => slide.rnea(model.gravity, qdd),
-        None => rnea_in(model, &Frames::new(model, q), qd, qdd),
+        None => {
+            let screws = Screws::new(&Frames::new(model, q));
+            let motion = Motion::new(&screws, qd).accelerated(&screws, qdd);
+            rnea_in(model, &screws, &motion)
+        }
     }
 }
 
 /// C(q, q̇) q̇ + g(q) (Nm).
 pub fn bias(model: &ArmModel, q: &JointVector, qd: &JointVector) -> JointVector {
-    rnea(model, q, qd, &JointVector::zeros())
+    match &model.slide {
+        Some(slide) => slide.rnea(model.gravity, &JointVector::zeros()),
+        None => {
+            let screws = Screws::new(&Frames::new(model, q));
+            rnea_in(model, &screws, &Motion::new(&screws, qd))
+        }
+    }
 }
 
 /// g(q): the torques that hold the arm still (Nm).
@@ -27,82 +39,51 @@ pub fn gravity_torque(model: &ArmModel, q: &JointVector) -> JointVector {
 }
 
 #[inline(always)]
-pub(crate) fn rnea_in(
+pub(crate) fn rnea_in(model: &ArmModel, screws: &Screws, motion: &Motion) -> JointVector {
+    let bodies = Bodies::new(model, screws);
+    joints_of(&joint_torques(model, screws, motion, &bodies, &Spatial::zeros()))
+}
+
+/// The inward pass. `f_tip` acts ON the tip.
+#[inline(always)]
+pub(crate) fn joint_torques(
     model: &ArmModel,
-    frames: &Frames,
-    qd: &JointVector,
-    qdd: &JointVector,
-) -> JointVector {
-    let wrenches = link_wrenches(model, frames, qd, qdd);
-    let mut tau = JointVector::zeros();
-    let (mut f, mut n) = (V3::ZERO, V3::ZERO);
-    for i in (0..DOF).rev() {
-        if i + 1 < DOF {
-            n += (frames.o[i + 1] - frames.o[i]).cross(f);
-        }
-        f += wrenches[i].f;
-        n += wrenches[i].n;
-        tau[i] = frames.r[i].z.dot(n);
+    screws: &Screws,
+    motion: &Motion,
+    bodies: &Bodies,
+    f_tip: &Spatial,
+) -> [Pair; PAIRS] {
+    let mut taken = bodies.wrenches(model.gravity, motion);
+    // the tip itself is no body: its lane has what the surroundings take off link 7
+    let at_tip = |k: usize| V3::pair(V3::ZERO, v3(-f_tip[k], -f_tip[k + 1], -f_tip[k + 2]));
+    taken.f[PAIRS - 1] += at_tip(0);
+    taken.n[PAIRS - 1] += at_tip(3);
+    sum_from_tip(&mut taken.f);
+    sum_from_tip(&mut taken.n);
+    let mut tau = [Pair::default(); PAIRS];
+    for k in 0..PAIRS {
+        tau[k] = screws.s[k].dot(taken.f[k]) + screws.r[k].z.dot(taken.n[k]);
     }
     tau
 }
 
-/// Force (N) and moment about the joint origin (Nm) that a link's motion asks for, in base axes.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Wrench {
-    pub f: V3,
-    pub n: V3,
-}
-
-/// The outward pass: what each link on its own needs to move so, gravity included.
-#[inline(always)]
-pub(crate) fn link_wrenches(
-    model: &ArmModel,
-    frames: &Frames,
-    qd: &JointVector,
-    qdd: &JointVector,
-) -> [Wrench; DOF] {
-    let mut out = [Wrench::default(); DOF];
-    let (mut w, mut dw, mut a) = (V3::ZERO, V3::ZERO, -model.gravity);
-    let mut spin = M3::default();
-    for i in 0..DOF {
-        if i > 0 {
-            a += spin * (frames.o[i] - frames.o[i - 1]);
+impl Motion {
+    /// The same speeds with joint accelerations.
+    #[inline(always)]
+    pub fn accelerated(&self, screws: &Screws, qdd: &JointVector) -> Motion {
+        let qdd = pairs_of(qdd, 0.0);
+        let mut added = Motion::default();
+        for k in 0..PAIRS {
+            added.a[k] = screws.s[k] * qdd[k];
+            added.dw[k] = screws.r[k].z * qdd[k];
         }
-        let r = &frames.r[i];
-        let zd = r.z * qd[i];
-        dw += r.z * qdd[i] + w.cross(zd);
-        w += zd;
-        spin = spin_matrix(w, dw);
-        let body = &model.joints[i].body;
-        let h = *r * body.h;
-        let (wb, dwb) = (r.tr_mul(w), r.tr_mul(dw));
-        out[i].f = a * body.m + spin * h;
-        out[i].n = *r * (body.i * dwb + wb.cross(body.i * wb)) + h.cross(a);
-    }
-    out
-}
-
-/// `[ω̇]ₓ + [ω]ₓ²`: acceleration of a point of a body relative to its reference point, per offset.
-#[inline(always)]
-fn spin_matrix(w: V3, dw: V3) -> M3 {
-    let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
-    let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
-    M3 {
-        x: V3 {
-            x: -(yy + zz),
-            y: xy + dw.z,
-            z: xz - dw.y,
-        },
-        y: V3 {
-            x: xy - dw.z,
-            y: -(xx + zz),
-            z: yz + dw.x,
-        },
-        z: V3 {
-            x: xz + dw.y,
-            y: yz - dw.x,
-            z: -(xx + yy),
-        },
+        sum_from_base(&mut added.a);
+        sum_from_base(&mut added.dw);
+        for k in 0..PAIRS {
+            added.a[k] += self.a[k];
+            added.dw[k] += self.dw[k];
+        }
+        (added.v, added.w) = (self.v, self.w);
+        added
     }
 }

@@ -9,11 +9,7 @@ use nalgebra::{Matrix3, Vector3, Vector4};
 pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
     let q = quaternion(r);
     // the rotation vector of the short way round
-    let (w, v) = if q[3] < 0.0 {
-        (-q[3], -q.xyz())
-    } else {
-        (q[3], q.xyz())
-    };
+    let (w, v) = if q[3] < 0.0 { (-q[3], -q.xyz()) } else { (q[3], q.xyz()) };
     let s = v.norm();
     if s < 1e-8 {
         // 2 atan(s/w)/s to within s²/3
@@ -47,8 +43,7 @@ pub fn orientation_error(r: &Matrix3<f64>, rd: &Matrix3<f64>) -> Vector3<f64> {
 
 /// Rz(yaw) Ry(pitch) Rx(roll): roll about the fixed x, then pitch about the fixed y, then yaw about the fixed z.
 pub fn from_rpy(roll: f64, pitch: f64, yaw: f64) -> Matrix3<f64> {
-    let ((sr, cr), (sp, cp), (sy, cy)) =
-        (libm::sincos(roll), libm::sincos(pitch), libm::sincos(yaw));
+    let ((sr, cr), (sp, cp), (sy, cy)) = (libm::sincos(roll), libm::sincos(pitch), libm::sincos(yaw));
     Matrix3::new(
         cy * cp,
         cy * sp * sr - sy * cr,
@@ -78,26 +73,11 @@ pub fn quaternion(r: &Matrix3<f64>) -> Vector4<f64> {
     let q = if t >= r.m11 && t >= r.m22 && t >= r.m33 {
         Vector4::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12, 1.0 + t)
     } else if r.m11 >= r.m22 && r.m11 >= r.m33 {
-        Vector4::new(
-            1.0 + 2.0 * r.m11 - t,
-            r.m12 + r.m21,
-            r.m13 + r.m31,
-            r.m32 - r.m23,
-        )
+        Vector4::new(1.0 + 2.0 * r.m11 - t, r.m12 + r.m21, r.m13 + r.m31, r.m32 - r.m23)
     } else if r.m22 >= r.m33 {
-        Vector4::new(
-            r.m12 + r.m21,
-            1.0 + 2.0 * r.m22 - t,
-            r.m23 + r.m32,
-            r.m13 - r.m31,
-        )
+        Vector4::new(r.m12 + r.m21, 1.0 + 2.0 * r.m22 - t, r.m23 + r.m32, r.m13 - r.m31)
     } else {
-        Vector4::new(
-            r.m13 + r.m31,
-            r.m23 + r.m32,
-            1.0 + 2.0 * r.m33 - t,
-            r.m21 - r.m12,
-        )
+        Vector4::new(r.m13 + r.m31, r.m23 + r.m32, 1.0 + 2.0 * r.m33 - t, r.m21 - r.m12)
     };
     q / q.norm()
 }

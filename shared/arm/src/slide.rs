@@ -15,10 +15,7 @@ pub(crate) struct Slide {
 
 impl Slide {
     pub fn pose(&self, q: &JointVector) -> Pose {
-        Pose {
-            p: Vector3::new(0.0, 0.0, q[0]),
-            r: Matrix3::identity(),
-        }
+        Pose { p: Vector3::new(0.0, 0.0, q[0]), r: Matrix3::identity() }
     }
 
     pub fn jacobian(&self) -> Jacobian {
@@ -48,13 +45,7 @@ impl Slide {
         m
     }
 
-    pub fn aba(
-        &self,
-        gravity: V3,
-        tau: &JointVector,
-        armature: &JointVector,
-        f_tip: &Spatial,
-    ) -> JointVector {
+    pub fn aba(&self, gravity: V3, tau: &JointVector, armature: &JointVector, f_tip: &Spatial) -> JointVector {
         let mut qdd = tau.zip_map(armature, |t, a| t / (1.0 + a));
         qdd[0] = (tau[0] + self.mass * gravity.z + f_tip[2]) / (self.mass + armature[0]);
         qdd

@@ -1,4 +1,5 @@
-//! Three-vectors, 3×3 matrices and symmetric 3×3 matrices with nothing but plain multiplications and additions.
+//! Three-vectors, 3×3 matrices and symmetric 3×3 matrices with nothing but plain multiplications and additions, of numbers
+//! or of pairs of numbers (`lanes`).
 //!
 //! The inner loops of the arm's algorithms use these instead of nalgebra: every operation is written out, so the
 //! compiler keeps it in registers, and the order of the additions is the same on every machine. Nothing here fails.
@@ -6,67 +7,63 @@
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
+/// What a component may be.
+pub(crate) trait Real:
+    Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
+}
+
+impl Real for f64 {}
+
 /// A 3-vector.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct V3 {
-    pub x: f64,
-    pub y: f64,
-    pub z: f64,
+pub(crate) struct V3<T = f64> {
+    pub x: T,
+    pub y: T,
+    pub z: T,
 }
 
 /// A 3×3 matrix by columns; of a rotation, the axes of the rotated frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct M3 {
-    pub x: V3,
-    pub y: V3,
-    pub z: V3,
+pub(crate) struct M3<T = f64> {
+    pub x: V3<T>,
+    pub y: V3<T>,
+    pub z: V3<T>,
 }
 
 /// A symmetric 3×3 matrix.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Sym3 {
-    pub xx: f64,
-    pub xy: f64,
-    pub xz: f64,
-    pub yy: f64,
-    pub yz: f64,
-    pub zz: f64,
+pub(crate) struct Sym3<T = f64> {
+    pub xx: T,
+    pub xy: T,
+    pub xz: T,
+    pub yy: T,
+    pub yz: T,
+    pub zz: T,
 }
 
-pub(crate) const fn v3(x: f64, y: f64, z: f64) -> V3 {
+pub(crate) const fn v3<T>(x: T, y: T, z: T) -> V3<T> {
     V3 { x, y, z }
 }
 
 impl V3 {
     pub const ZERO: V3 = v3(0.0, 0.0, 0.0);
+}
 
+impl<T: Real> V3<T> {
     #[inline(always)]
-    pub fn dot(self, b: V3) -> f64 {
+    pub fn dot(self, b: V3<T>) -> T {
         self.x * b.x + self.y * b.y + self.z * b.z
     }
 
     #[inline(always)]
-    pub fn cross(self, b: V3) -> V3 {
-        v3(
-            self.y * b.z - self.z * b.y,
-            self.z * b.x - self.x * b.z,
-            self.x * b.y - self.y * b.x,
-        )
+    pub fn cross(self, b: V3<T>) -> V3<T> {
+        v3(self.y * b.z - self.z * b.y, self.z * b.x - self.x * b.z, self.x * b.y - self.y * b.x)
     }
 }
 
 impl M3 {
-    pub const IDENTITY: M3 = M3 {
-        x: v3(1.0, 0.0, 0.0),
-        y: v3(0.0, 1.0, 0.0),
-        z: v3(0.0, 0.0, 1.0),
-    };
-
-    /// `selfᵀ v`.
-    #[inline(always)]
-    pub fn tr_mul(self, v: V3) -> V3 {
-        v3(self.x.dot(v), self.y.dot(v), self.z.dot(v))
-    }
+    pub const IDENTITY: M3 = M3 { x: v3(1.0, 0.0, 0.0), y: v3(0.0, 1.0, 0.0), z: v3(0.0, 0.0, 1.0) };
 
     pub fn transpose(self) -> M3 {
         M3 {
@@ -77,42 +74,46 @@ impl M3 {
     }
 }
 
-impl Sym3 {
+impl<T: Real> Sym3<T> {
     /// `R self Rᵀ`: the same tensor, its components given along the axes that `R` maps to.
     #[inline(always)]
-    pub fn rotated(self, r: M3) -> Sym3 {
-        let t = M3 {
-            x: r.x * self.xx + r.y * self.xy + r.z * self.xz,
-            y: r.x * self.xy + r.y * self.yy + r.z * self.yz,
-            z: r.x * self.xz + r.y * self.yz + r.z * self.zz,
+    pub fn rotated(self, r: M3<T>) -> Sym3<T> {
+        // column by column, so that few numbers live at a time
+        let part = |t: V3<T>, r: V3<T>| Sym3 {
+            xx: t.x * r.x,
+            xy: t.x * r.y,
+            xz: t.x * r.z,
+            yy: t.y * r.y,
+            yz: t.y * r.z,
+            zz: t.z * r.z,
         };
+        part(r.x * self.xx + r.y * self.xy + r.z * self.xz, r.x)
+            + part(r.x * self.xy + r.y * self.yy + r.z * self.yz, r.y)
+            + part(r.x * self.xz + r.y * self.yz + r.z * self.zz, r.z)
+    }
+
+    /// `a bᵀ + b aᵀ`: how second moments of a body with first moment `b` grow when its reference point moves by −`a`.
+    #[inline(always)]
+    pub fn outer_sum(a: V3<T>, b: V3<T>) -> Sym3<T> {
+        let (x, y, z) = (a.x * b.x, a.y * b.y, a.z * b.z);
         Sym3 {
-            xx: t.x.x * r.x.x + t.y.x * r.y.x + t.z.x * r.z.x,
-            xy: t.x.x * r.x.y + t.y.x * r.y.y + t.z.x * r.z.y,
-            xz: t.x.x * r.x.z + t.y.x * r.y.z + t.z.x * r.z.z,
-            yy: t.x.y * r.x.y + t.y.y * r.y.y + t.z.y * r.z.y,
-            yz: t.x.y * r.x.z + t.y.y * r.y.z + t.z.y * r.z.z,
-            zz: t.x.z * r.x.z + t.y.z * r.y.z + t.z.z * r.z.z,
+            xx: x + x,
+            yy: y + y,
+            zz: z + z,
+            xy: a.x * b.y + a.y * b.x,
+            xz: a.x * b.z + a.z * b.x,
+            yz: a.y * b.z + a.z * b.y,
         }
     }
 
-    /// `−([a]ₓ[b]ₓ + [b]ₓ[a]ₓ)`: how the inertia tensor of a body with first moment `b` grows when its reference point moves.
     #[inline(always)]
-    pub fn shift(a: V3, b: V3) -> Sym3 {
-        let (x, y, z) = (2.0 * a.x * b.x, 2.0 * a.y * b.y, 2.0 * a.z * b.z);
-        Sym3 {
-            xx: y + z,
-            yy: x + z,
-            zz: x + y,
-            xy: -(a.x * b.y + a.y * b.x),
-            xz: -(a.x * b.z + a.z * b.x),
-            yz: -(a.y * b.z + a.z * b.y),
-        }
+    pub fn trace(self) -> T {
+        self.xx + self.yy + self.zz
     }
 
     /// `self − v vᵀ s`.
     #[inline(always)]
-    pub fn minus_outer(self, v: V3, s: f64) -> Sym3 {
+    pub fn minus_outer(self, v: V3<T>, s: T) -> Sym3<T> {
         let w = v * s;
         Sym3 {
             xx: self.xx - v.x * w.x,
@@ -125,10 +126,36 @@ impl Sym3 {
     }
 }
 
-impl Mul<V3> for Sym3 {
-    type Output = V3;
+impl Sym3 {
+    /// `−([a]ₓ[b]ₓ + [b]ₓ[a]ₓ)`: how the inertia tensor of a body with first moment `b` grows when its reference point moves.
+    pub fn shift(a: V3, b: V3) -> Sym3 {
+        Sym3::outer_sum(a, b).complement()
+    }
+
+    /// `tr(self)·1 − self`: the inertia tensor of these second moments.
     #[inline(always)]
-    fn mul(self, v: V3) -> V3 {
+    pub fn complement(self) -> Sym3 {
+        Sym3 {
+            xx: self.yy + self.zz,
+            yy: self.xx + self.zz,
+            zz: self.xx + self.yy,
+            xy: -self.xy,
+            xz: -self.xz,
+            yz: -self.yz,
+        }
+    }
+
+    /// `½ tr(self)·1 − self`: the second moments of this inertia tensor.
+    pub fn second_moments(self) -> Sym3 {
+        let half = 0.5 * self.trace();
+        Sym3 { xx: half - self.xx, yy: half - self.yy, zz: half - self.zz, xy: -self.xy, xz: -self.xz, yz: -self.yz }
+    }
+}
+
+impl<T: Real> Mul<V3<T>> for Sym3<T> {
+    type Output = V3<T>;
+    #[inline(always)]
+    fn mul(self, v: V3<T>) -> V3<T> {
         v3(
             self.xx * v.x + self.xy * v.y + self.xz * v.z,
             self.xy * v.x + self.yy * v.y + self.yz * v.z,
@@ -137,25 +164,18 @@ impl Mul<V3> for Sym3 {
     }
 }
 
-impl Mul<f64> for Sym3 {
-    type Output = Sym3;
+impl<T: Real> Mul<T> for Sym3<T> {
+    type Output = Sym3<T>;
     #[inline(always)]
-    fn mul(self, s: f64) -> Sym3 {
-        Sym3 {
-            xx: self.xx * s,
-            xy: self.xy * s,
-            xz: self.xz * s,
-            yy: self.yy * s,
-            yz: self.yz * s,
-            zz: self.zz * s,
-        }
+    fn mul(self, s: T) -> Sym3<T> {
+        Sym3 { xx: self.xx * s, xy: self.xy * s, xz: self.xz * s, yy: self.yy * s, yz: self.yz * s, zz: self.zz * s }
     }
 }
 
-impl Add for Sym3 {
-    type Output = Sym3;
+impl<T: Real> Add for Sym3<T> {
+    type Output = Sym3<T>;
     #[inline(always)]
-    fn add(self, b: Sym3) -> Sym3 {
+    fn add(self, b: Sym3<T>) -> Sym3<T> {
         Sym3 {
             xx: self.xx + b.xx,
             xy: self.xy + b.xy,
@@ -167,68 +187,64 @@ impl Add for Sym3 {
     }
 }
 
-impl Mul<V3> for M3 {
-    type Output = V3;
+impl<T: Real> Mul<V3<T>> for M3<T> {
+    type Output = V3<T>;
     #[inline(always)]
-    fn mul(self, v: V3) -> V3 {
+    fn mul(self, v: V3<T>) -> V3<T> {
         self.x * v.x + self.y * v.y + self.z * v.z
     }
 }
 
-impl Mul for M3 {
-    type Output = M3;
+impl<T: Real> Mul for M3<T> {
+    type Output = M3<T>;
     #[inline(always)]
-    fn mul(self, b: M3) -> M3 {
-        M3 {
-            x: self * b.x,
-            y: self * b.y,
-            z: self * b.z,
-        }
+    fn mul(self, b: M3<T>) -> M3<T> {
+        M3 { x: self * b.x, y: self * b.y, z: self * b.z }
     }
 }
 
-impl Mul<f64> for V3 {
-    type Output = V3;
+impl<T: Real> Mul<T> for V3<T> {
+    type Output = V3<T>;
     #[inline(always)]
-    fn mul(self, s: f64) -> V3 {
+    fn mul(self, s: T) -> V3<T> {
         v3(self.x * s, self.y * s, self.z * s)
     }
 }
 
-impl Add for V3 {
-    type Output = V3;
+impl<T: Real> Add for V3<T> {
+    type Output = V3<T>;
     #[inline(always)]
-    fn add(self, b: V3) -> V3 {
+    fn add(self, b: V3<T>) -> V3<T> {
         v3(self.x + b.x, self.y + b.y, self.z + b.z)
     }
 }
 
-impl Sub for V3 {
-    type Output = V3;
+impl<T: Real> Sub for V3<T> {
+    type Output = V3<T>;
     #[inline(always)]
-    fn sub(self, b: V3) -> V3 {
+    fn sub(self, b: V3<T>) -> V3<T> {
         v3(self.x - b.x, self.y - b.y, self.z - b.z)
     }
 }
 
-impl Neg for V3 {
-    type Output = V3;
+impl<T: Real> Neg for V3<T> {
+    type Output = V3<T>;
     #[inline(always)]
-    fn neg(self) -> V3 {
+    fn neg(self) -> V3<T> {
         v3(-self.x, -self.y, -self.z)
     }
 }
 
-impl AddAssign for V3 {
+impl<T: Real> AddAssign for V3<T> {
     #[inline(always)]
-    fn add_assign(&mut self, b: V3) {
+    fn add_assign(&mut self, b: V3<T>) {
         *self = *self + b;
     }
 }
 
-impl SubAssign for V3 {
+impl<T: Real> SubAssign for V3<T> {
     #[inline(always)]
-    fn sub_assign(&mut self, b: V3) {
+    fn sub_assign(&mut self, b: V3<T>) {
         *self = *self - b;
     }
 }
@@ -247,19 +263,13 @@ impl From<V3> for Vector3<f64> {
 
 impl From<Matrix3<f64>> for M3 {
     fn from(m: Matrix3<f64>) -> M3 {
-        M3 {
-            x: v3(m.m11, m.m21, m.m31),
-            y: v3(m.m12, m.m22, m.m32),
-            z: v3(m.m13, m.m23, m.m33),
-        }
+        M3 { x: v3(m.m11, m.m21, m.m31), y: v3(m.m12, m.m22, m.m32), z: v3(m.m13, m.m23, m.m33) }
     }
 }
 
 impl From<M3> for Matrix3<f64> {
     fn from(m: M3) -> Matrix3<f64> {
-        Matrix3::new(
-            m.x.x, m.y.x, m.z.x, m.x.y, m.y.y, m.z.y, m.x.z, m.y.z, m.z.z,
-        )
+        Matrix3::new(m.x.x, m.y.x, m.z.x, m.x.y, m.y.y, m.z.y, m.x.z, m.y.z, m.z.z)
     }
 }
 
@@ -270,14 +280,7 @@ mod tests {
     #[test]
     fn rotating_and_shifting_a_tensor_equal_the_matrix_products_they_stand_for() {
         let r = Matrix3::new(0.36, 0.48, -0.8, -0.8, 0.6, 0.0, 0.48, 0.64, 0.6);
-        let s = Sym3 {
-            xx: 1.0,
-            xy: 0.2,
-            xz: -0.3,
-            yy: 2.0,
-            yz: 0.4,
-            zz: 3.0,
-        };
+        let s = Sym3 { xx: 1.0, xy: 0.2, xz: -0.3, yy: 2.0, yz: 0.4, zz: 3.0 };
         let full = |s: Sym3| Matrix3::new(s.xx, s.xy, s.xz, s.xy, s.yy, s.yz, s.xz, s.yz, s.zz);
         assert!((full(s.rotated(r.into())) - r * full(s) * r.transpose()).amax() < 1e-15);
 

@@ -6,6 +6,7 @@
 
 mod document;
 
+use crate::chain::Chain;
 use crate::inertia::{Inertia, is_physical};
 use crate::model::{ArmModel, DEFAULT_GRAVITY, Joint};
 use crate::small::{M3, V3};
@@ -117,9 +118,7 @@ pub enum UrdfError {
         reason: &'static str,
     },
     /// Not seven.
-    #[error(
-        "{found} revolute joints between '{base}' and '{tip}' ({names}); this arm has exactly 7"
-    )]
+    #[error("{found} revolute joints between '{base}' and '{tip}' ({names}); this arm has exactly 7")]
     JointCount {
         /// How many there are.
         found: usize,
@@ -180,11 +179,7 @@ pub(crate) fn read(xml: &str, base: Option<&str>, tip: &str) -> Result<ArmModel,
     let doc = Document::parse(xml)?;
     let tip = find(&doc, "tip", tip)?;
     let (base, chain) = chain(&doc, base, tip)?;
-    let moving: Vec<usize> = chain
-        .iter()
-        .copied()
-        .filter(|&j| doc.joints[j].kind != Kind::Fixed)
-        .collect();
+    let moving: Vec<usize> = chain.iter().copied().filter(|&j| doc.joints[j].kind != Kind::Fixed).collect();
     for &j in &moving {
         check_chain_joint(&doc.joints[j])?;
     }
@@ -194,21 +189,13 @@ pub(crate) fn read(xml: &str, base: Option<&str>, tip: &str) -> Result<ArmModel,
             found: moving.len(),
             base: doc.links[base].name.clone(),
             tip: doc.links[tip].name.clone(),
-            names: moving
-                .iter()
-                .map(|&j| doc.joints[j].name.as_str())
-                .collect::<Vec<_>>()
-                .join(", "),
+            names: moving.iter().map(|&j| doc.joints[j].name.as_str()).collect::<Vec<_>>().join(", "),
         });
     };
     let mut model = ArmModel {
         name: doc.name.clone(),
         joint_names,
-        joints: std::array::from_fn(|_| Joint {
-            r: M3::IDENTITY,
-            p: V3::ZERO,
-            body: Inertia::default(),
-        }),
+        joints: std::array::from_fn(|_| Joint { r: M3::IDENTITY, p: V3::ZERO, body: Inertia::default() }),
         tip_r: M3::IDENTITY,
         tip_p: V3::ZERO,
         gravity: DEFAULT_GRAVITY,
@@ -218,9 +205,10 @@ pub(crate) fn read(xml: &str, base: Option<&str>, tip: &str) -> Result<ArmModel,
         effort: limit(&doc, &moving, |j| j.limit.effort),
         held: Vec::new(),
         slide: None,
+        chain: Chain::default(),
     };
     assemble(&doc, base, tip, &moving, &mut model)?;
-    Ok(model)
+    Ok(model.settled())
 }
 
 fn limit(doc: &Document, moving: &[usize], of: impl Fn(&RawJoint) -> f64) -> JointVector {
@@ -233,11 +221,7 @@ fn find(doc: &Document, role: &'static str, name: &str) -> Result<usize, UrdfErr
         if doc.links.len() > known.len() {
             known.push("…");
         }
-        UrdfError::NoSuchLink {
-            role,
-            name: name.into(),
-            known: known.join(", "),
-        }
+        UrdfError::NoSuchLink { role, name: name.into(), known: known.join(", ") }
     })
 }
 
@@ -255,10 +239,9 @@ fn chain(doc: &Document, base: Option<&str>, tip: usize) -> Result<(usize, Vec<u
         }
     }
     match wanted {
-        Some(b) if b != link => Err(UrdfError::NotBelowBase {
-            base: doc.links[b].name.clone(),
-            tip: doc.links[tip].name.clone(),
-        }),
+        Some(b) if b != link => {
+            Err(UrdfError::NotBelowBase { base: doc.links[b].name.clone(), tip: doc.links[tip].name.clone() })
+        }
         _ => {
             chain.reverse();
             Ok((link, chain))
@@ -267,13 +250,8 @@ fn chain(doc: &Document, base: Option<&str>, tip: usize) -> Result<(usize, Vec<u
 }
 
 fn check_chain_joint(joint: &RawJoint) -> Result<(), UrdfError> {
-    let refuse = |reason| {
-        Err(UrdfError::UnsupportedJoint {
-            joint: joint.name.clone(),
-            kind: joint.kind.name(),
-            reason,
-        })
-    };
+    let refuse =
+        |reason| Err(UrdfError::UnsupportedJoint { joint: joint.name.clone(), kind: joint.kind.name(), reason });
     match joint.kind {
         Kind::Revolute | Kind::Continuous if joint.mimic => {
             refuse("it mimics another joint, but every joint of the arm has its own drive")
@@ -282,23 +260,12 @@ fn check_chain_joint(joint: &RawJoint) -> Result<(), UrdfError> {
         _ => refuse("only revolute, continuous and fixed joints may lie between base and tip"),
     }?;
     let limit = &joint.limit;
-    let wrong = |what: String| {
-        Err(UrdfError::Limits {
-            joint: joint.name.clone(),
-            what,
-        })
-    };
+    let wrong = |what: String| Err(UrdfError::Limits { joint: joint.name.clone(), what });
     if limit.lower > limit.upper {
-        return wrong(format!(
-            "limits are reversed: lower {} rad > upper {} rad",
-            limit.lower, limit.upper
-        ));
+        return wrong(format!("limits are reversed: lower {} rad > upper {} rad", limit.lower, limit.upper));
     }
     if limit.velocity < 0.0 || limit.effort < 0.0 {
-        return wrong(format!(
-            "negative limit: velocity {} rad/s, effort {} Nm",
-            limit.velocity, limit.effort
-        ));
+        return wrong(format!("negative limit: velocity {} rad/s, effort {} Nm", limit.velocity, limit.effort));
     }
     Ok(())
 }
@@ -312,36 +279,18 @@ struct Placement {
 
 impl Placement {
     fn then(self, r: M3, p: V3) -> Placement {
-        Placement {
-            r: self.r * r,
-            p: self.p + self.r * p,
-        }
+        Placement { r: self.r * r, p: self.p + self.r * p }
     }
 }
 
 /// Walks the tree below `base`, and gives every joint of the arm its placement and every link's inertia to the joint
 /// that moves it.
-fn assemble(
-    doc: &Document,
-    base: usize,
-    tip: usize,
-    moving: &[usize],
-    model: &mut ArmModel,
-) -> Result<(), UrdfError> {
+fn assemble(doc: &Document, base: usize, tip: usize, moving: &[usize], model: &mut ArmModel) -> Result<(), UrdfError> {
     // a link, the joint of the arm that moves it, and the link's placement in that joint's frame
-    let mut open = vec![(
-        base,
-        None::<usize>,
-        Placement {
-            r: M3::IDENTITY,
-            p: V3::ZERO,
-        },
-    )];
+    let mut open = vec![(base, None::<usize>, Placement { r: M3::IDENTITY, p: V3::ZERO })];
     while let Some((link, mover, at)) = open.pop() {
         if let Some(i) = mover {
-            model.joints[i].body = model.joints[i]
-                .body
-                .plus(&checked_inertia(doc, link)?.moved(at.r, at.p));
+            model.joints[i].body = model.joints[i].body.plus(&checked_inertia(doc, link)?.moved(at.r, at.p));
             if link == tip {
                 (model.tip_r, model.tip_p) = (at.r, at.p);
             }
@@ -355,25 +304,13 @@ fn assemble(
                 (model.joints[i].r, model.joints[i].p) = (placed.r, placed.p);
                 if doc.links[joint.child].mass.is_none_or(|m| m <= 0.0) {
                     let link = doc.links[joint.child].name.clone();
-                    return Err(UrdfError::MissingInertia {
-                        link,
-                        joint: joint.name.clone(),
-                    });
+                    return Err(UrdfError::MissingInertia { link, joint: joint.name.clone() });
                 }
-                open.push((
-                    joint.child,
-                    Some(i),
-                    Placement {
-                        r: align.transpose(),
-                        p: V3::ZERO,
-                    },
-                ));
+                open.push((joint.child, Some(i), Placement { r: align.transpose(), p: V3::ZERO }));
             } else {
                 match joint.kind {
                     Kind::Fixed => {}
-                    Kind::Revolute | Kind::Continuous | Kind::Prismatic => {
-                        model.held.push(joint.name.clone())
-                    }
+                    Kind::Revolute | Kind::Continuous | Kind::Prismatic => model.held.push(joint.name.clone()),
                     Kind::Floating | Kind::Planar => {
                         return Err(UrdfError::UnsupportedJoint {
                             joint: joint.name.clone(),
@@ -396,10 +333,7 @@ fn checked_inertia(doc: &Document, link: usize) -> Result<Inertia, UrdfError> {
         return Ok(Inertia::default());
     };
     if mass < 0.0 {
-        return Err(UrdfError::NegativeMass {
-            link: link.name.clone(),
-            mass,
-        });
+        return Err(UrdfError::NegativeMass { link: link.name.clone(), mass });
     }
     let t = link.tensor;
     if !is_physical(&Matrix3::from(t)) {
@@ -416,19 +350,13 @@ fn checked_inertia(doc: &Document, link: usize) -> Result<Inertia, UrdfError> {
 fn z_to(joint: &RawJoint) -> Result<M3, UrdfError> {
     let length = joint.axis.dot(joint.axis).sqrt();
     if length <= 1e-9 || length.is_infinite() {
-        return Err(UrdfError::ZeroAxis {
-            joint: joint.name.clone(),
-        });
+        return Err(UrdfError::ZeroAxis { joint: joint.name.clone() });
     }
     let z = joint.axis * (1.0 / length);
     if z == M3::IDENTITY.z {
         return Ok(M3::IDENTITY);
     }
-    let near = [
-        (z.x.abs(), M3::IDENTITY.x),
-        (z.y.abs(), M3::IDENTITY.y),
-        (z.z.abs(), M3::IDENTITY.z),
-    ];
+    let near = [(z.x.abs(), M3::IDENTITY.x), (z.y.abs(), M3::IDENTITY.y), (z.z.abs(), M3::IDENTITY.z)];
     let mut least = near[0];
     for candidate in near {
         if candidate.0 < least.0 {
@@ -437,9 +365,5 @@ fn z_to(joint: &RawJoint) -> Result<M3, UrdfError> {
     }
     let x = least.1.cross(z);
     let x = x * (1.0 / x.dot(x).sqrt());
-    Ok(M3 {
-        x,
-        y: z.cross(x),
-        z,
-    })
+    Ok(M3 { x, y: z.cross(x), z })
 }

@@ -2,9 +2,7 @@
 
 #![allow(unsafe_code)] // a global allocator cannot be written without
 
-use arm::{
-    ArmModel, ArmState, JointVector, Spatial, aba, bias, crba, gravity_torque, rnea, tip_motion,
-};
+use arm::{ArmModel, ArmState, JointVector, Spatial, aba, bias, crba, gravity_torque, rnea, tip_motion};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -39,11 +37,8 @@ fn no_algorithm_allocates() {
     for model in [&model, &slide] {
         let (q, qd) = (JointVector::repeat(0.3), JointVector::repeat(-0.2));
         sum += tip_motion(model, &q, &qd).pose.p.sum();
-        sum += rnea(model, &q, &qd, &q).sum()
-            + bias(model, &q, &qd).sum()
-            + gravity_torque(model, &q).sum();
-        sum +=
-            crba(model, &q).sum() + aba(model, &q, &qd, &q, &qd.abs(), &Spatial::repeat(1.0)).sum();
+        sum += rnea(model, &q, &qd, &q).sum() + bias(model, &q, &qd).sum() + gravity_torque(model, &q).sum();
+        sum += crba(model, &q).sum() + aba(model, &q, &qd, &q, &qd.abs(), &Spatial::repeat(1.0)).sum();
         let state = ArmState::new(model, &q, &qd);
         sum += state.mass_matrix().sum() + state.rnea(&q).sum() + state.tip_motion().twist.sum();
         // a large angle, whose reduction takes another way

@@ -18,10 +18,7 @@ impl Row<'_> {
 fn rows(file: &str) -> Vec<f64> {
     let path = format!("{}/tests/data/{file}", env!("CARGO_MANIFEST_DIR"));
     let bytes = std::fs::read(path).expect("reference values are part of the repository");
-    bytes
-        .chunks_exact(8)
-        .map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes")))
-        .collect()
+    bytes.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes"))).collect()
 }
 
 fn rediestro() -> ArmModel {
@@ -42,17 +39,8 @@ fn worst(model: &ArmModel, file: &str, states: usize) -> [f64; 8] {
         let (q, qd, qdd, tau) = (row.joints(0), row.joints(7), row.joints(14), row.joints(21));
         let tip = tip_motion(model, &q, &qd);
         let m = crba(model, &q);
-        let upper: Vec<f64> = (0..7)
-            .flat_map(|i| (i..7).map(move |j| m[(i, j)]))
-            .collect();
-        let fd = aba(
-            model,
-            &q,
-            &qd,
-            &tau,
-            &JointVector::zeros(),
-            &Spatial::zeros(),
-        );
+        let upper: Vec<f64> = (0..7).flat_map(|i| (i..7).map(move |j| m[(i, j)])).collect();
+        let fd = aba(model, &q, &qd, &tau, &JointVector::zeros(), &Spatial::zeros());
         let ours: [Vec<f64>; 8] = [
             tip.pose.p.as_slice().to_vec(),
             tip.pose.r.transpose().as_slice().to_vec(),
@@ -68,10 +56,7 @@ fn worst(model: &ArmModel, file: &str, states: usize) -> [f64; 8] {
             let (part, rest) = theirs.split_at(ours.len());
             theirs = rest;
             let largest = part.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-            let difference = ours
-                .iter()
-                .zip(part)
-                .fold(0.0_f64, |a, (x, y)| a.max((x - y).abs()));
+            let difference = ours.iter().zip(part).fold(0.0_f64, |a, (x, y)| a.max((x - y).abs()));
             worst[k] = worst[k].max(difference / largest);
         }
     }
@@ -85,10 +70,7 @@ fn check(model: &ArmModel, file: &str, states: usize) {
     for (k, (name, error)) in NAMES.iter().zip(worst).enumerate() {
         println!("{file} {name}: {error:.1e}");
         let limit = if k < 3 { 1e-13 } else { 1e-12 };
-        assert!(
-            error <= limit,
-            "{file}: {name} differs by {error:e} (relative)"
-        );
+        assert!(error <= limit, "{file}: {name} differs by {error:e} (relative)");
     }
 }
 

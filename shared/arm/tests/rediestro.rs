@@ -38,16 +38,8 @@ fn the_isotropic_posture_has_a_jacobian_of_condition_one_whatever_joint_1_does()
 fn the_table_top_posture_puts_the_tool_down_at_its_place() {
     let model = ArmModel::rediestro();
     let pose = forward_kinematics(&model, &table_top());
-    assert!(
-        (pose.p - Vector3::new(0.6, 0.0, 0.9)).norm() < 2e-3,
-        "{}",
-        pose.p
-    );
-    assert!(
-        (pose.r.column(2) + Vector3::z()).norm() < 2e-3,
-        "{}",
-        pose.r
-    );
+    assert!((pose.p - Vector3::new(0.6, 0.0, 0.9)).norm() < 2e-3, "{}", pose.p);
+    assert!((pose.r.column(2) + Vector3::z()).norm() < 2e-3, "{}", pose.r);
     let condition = condition(&model, &table_top(), 0.2206);
     assert!((condition - 5.25).abs() < 0.02, "{condition}");
 }
@@ -61,22 +53,12 @@ fn the_surrogate_masses_ask_for_the_torques_they_were_chosen_for() {
         assert!((torque - expected).abs() < 0.6, "{g}");
     }
     let (j, m) = (jacobian(&model, &table_top()), crba(&model, &table_top()));
-    let rotors = JointMatrix::from_diagonal(
-        &DriveData::rediestro().each(|d| d.rotor_inertia_at_output_kg_m2),
-    );
-    let task = |m: JointMatrix| {
-        (j * m.try_inverse().expect("a mass matrix") * j.transpose()).try_inverse()
-    };
+    let rotors = JointMatrix::from_diagonal(&DriveData::rediestro().each(|d| d.rotor_inertia_at_output_kg_m2));
+    let task = |m: JointMatrix| (j * m.try_inverse().expect("a mass matrix") * j.transpose()).try_inverse();
     // the tip pushed along z: free to give way in the other axes, or guided by them
-    let free = |m: JointMatrix| {
-        1.0 / (j * m.try_inverse().expect("a mass matrix") * j.transpose())[(2, 2)]
-    };
+    let free = |m: JointMatrix| 1.0 / (j * m.try_inverse().expect("a mass matrix") * j.transpose())[(2, 2)];
     let guided = task(m + rotors).expect("not singular")[(2, 2)];
-    println!(
-        "task inertia in z: links {}, with rotors {}, guided {guided} kg",
-        free(m),
-        free(m + rotors)
-    );
+    println!("task inertia in z: links {}, with rotors {}, guided {guided} kg", free(m), free(m + rotors));
     assert!((guided - 22.5).abs() < 0.1, "{guided} kg");
     let stiffness = DriveData::rediestro().each(|d| d.stiffness_nm_per_rad);
     let k_z = free(JointMatrix::from_diagonal(&stiffness));
@@ -98,9 +80,7 @@ fn gravity_never_asks_for_more_than_169_nm() {
     // joint 2 carries everything; a coarse search over what it carries
     let mut worst = 0.0_f64;
     for k in 0..40_000_u64 {
-        let q = JointVector::from_fn(|i, _| {
-            (halton(k + 1, [2, 3, 5, 7, 11, 13, 17][i]) - 0.5) * std::f64::consts::TAU
-        });
+        let q = JointVector::from_fn(|i, _| (halton(k + 1, [2, 3, 5, 7, 11, 13, 17][i]) - 0.5) * std::f64::consts::TAU);
         worst = worst.max(gravity_torque(&model, &q).amax());
     }
     println!("worst gravity torque {worst} Nm");

@@ -1,8 +1,8 @@
 //! The algorithms against each other and against finite differences, on random states of REDIESTRO and the Panda.
 
 use arm::{
-    ArmModel, ArmState, JointMatrix, JointVector, Spatial, Tool, aba, bias, crba,
-    forward_kinematics, gravity_torque, jacobian, jdot_qd, rnea, rotation, tip_motion,
+    ArmModel, ArmState, JointMatrix, JointVector, Spatial, Tool, aba, bias, crba, forward_kinematics, gravity_torque,
+    jacobian, jdot_qd, rnea, rotation, tip_motion,
 };
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
@@ -16,17 +16,14 @@ fn wrench() -> impl Strategy<Value = Spatial> {
 }
 
 fn robot() -> impl Strategy<Value = ArmModel> {
-    let panda = ArmModel::from_urdf(include_str!("data/panda.urdf"), None, "panda_hand_tcp")
-        .expect("a seven-joint arm");
+    let panda =
+        ArmModel::from_urdf(include_str!("data/panda.urdf"), None, "panda_hand_tcp").expect("a seven-joint arm");
     prop::sample::select(vec![ArmModel::rediestro(), panda])
 }
 
 /// Twist that takes one pose to another in `dt` seconds.
 fn difference(from: &arm::Pose, to: &arm::Pose, dt: f64) -> Spatial {
-    let (v, w) = (
-        (to.p - from.p) / dt,
-        rotation::log(&(to.r * from.r.transpose())) / dt,
-    );
+    let (v, w) = ((to.p - from.p) / dt, rotation::log(&(to.r * from.r.transpose())) / dt);
     Spatial::new(v.x, v.y, v.z, w.x, w.y, w.z)
 }
 
@@ -98,6 +95,37 @@ proptest! {
     }
 
     #[test]
+    fn forward_dynamics_by_the_mass_matrix_and_by_articulated_bodies_agree(
+        model in robot(), q in joints(3.1), qd in joints(3.0), tau in joints(50.0), f in wrench(), rotors in prop::bool::ANY,
+    ) {
+        let armature = JointVector::repeat(if rotors { 0.6 } else { 0.0 });
+        let state = ArmState::new(&model, &q, &qd);
+        let (a, b) = (state.accelerations(&tau, &armature, &f), state.aba(&tau, &armature, &f));
+        prop_assert!((a - b).amax() < 1e-10 * b.amax(), "{}", (a - b).amax() / b.amax());
+    }
+
+    #[test]
+    fn the_gravity_torque_is_the_gradient_of_the_potential_energy(model in robot(), q in joints(3.1)) {
+        let zero = JointVector::zeros();
+        let torque = gravity_torque(&model, &q);
+        for i in 0..7 {
+            let moved = |d: f64| {
+                let q = q + JointVector::from_fn(|k, _| if k == i { d } else { 0.0 });
+                ArmState::new(&model, &q, &zero).potential_energy()
+            };
+            let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+            prop_assert!((slope - torque[i]).abs() < 1e-6, "joint {}: {slope} {}", i + 1, torque[i]);
+        }
+    }
+
+    #[test]
+    fn the_tips_acceleration_is_that_of_the_jacobian(model in robot(), q in joints(3.1), qd in joints(2.0), qdd in joints(5.0)) {
+        let (state, tip) = (ArmState::new(&model, &q, &qd), tip_motion(&model, &q, &qd));
+        prop_assert_eq!(state.twist(), tip.twist);
+        prop_assert!((state.tip_acceleration(&qdd) - (tip.jacobian * qdd + tip.jdot_qd)).amax() < 1e-12);
+    }
+
+    #[test]
     fn the_twist_is_the_jacobian_times_the_joint_speeds(model in robot(), q in joints(3.1), qd in joints(2.0)) {
         let tip = tip_motion(&model, &q, &qd);
         prop_assert!((tip.twist - tip.jacobian * qd).amax() < 1e-13);
@@ -119,13 +147,9 @@ proptest! {
 #[test]
 fn a_free_swing_keeps_its_energy() {
     let model = ArmModel::rediestro();
-    let (mut q, mut qd) = (
-        JointVector::from([0.1, 0.4, -0.7, 1.1, 0.3, -0.5, 0.9]),
-        JointVector::zeros(),
-    );
+    let (mut q, mut qd) = (JointVector::from([0.1, 0.4, -0.7, 1.1, 0.3, -0.5, 0.9]), JointVector::zeros());
     let none = JointVector::zeros();
-    let accelerate =
-        |q: &JointVector, qd: &JointVector| aba(&model, q, qd, &none, &none, &Spatial::zeros());
+    let accelerate = |q: &JointVector, qd: &JointVector| aba(&model, q, qd, &none, &none, &Spatial::zeros());
     let kinetic = |q: &JointVector, qd: &JointVector| 0.5 * qd.dot(&multiply(&crba(&model, q), qd));
     let h = 1e-3;
     let (mut gained, mut largest, mut power) = (0.0, 0.0_f64, 0.0);

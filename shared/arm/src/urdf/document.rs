@@ -39,14 +39,8 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    const ALL: [Kind; 6] = [
-        Kind::Revolute,
-        Kind::Continuous,
-        Kind::Prismatic,
-        Kind::Fixed,
-        Kind::Floating,
-        Kind::Planar,
-    ];
+    const ALL: [Kind; 6] =
+        [Kind::Revolute, Kind::Continuous, Kind::Prismatic, Kind::Fixed, Kind::Floating, Kind::Planar];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -89,24 +83,11 @@ impl Document {
             return Err(UrdfError::NotARobot(robot.tag_name().name().into()));
         }
         let name = robot.attribute("name").unwrap_or("unnamed").into();
-        let mut doc = Document {
-            name,
-            links: Vec::new(),
-            joints: Vec::new(),
-            by_name: BTreeMap::new(),
-        };
+        let mut doc = Document { name, links: Vec::new(), joints: Vec::new(), by_name: BTreeMap::new() };
         for node in children(robot, "link") {
             let link = link(node)?;
-            if doc
-                .by_name
-                .insert(link.name.clone(), doc.links.len())
-                .is_some()
-            {
-                return Err(UrdfError::Duplicate {
-                    kind: "link",
-                    name: link.name,
-                    line: line(node),
-                });
+            if doc.by_name.insert(link.name.clone(), doc.links.len()).is_some() {
+                return Err(UrdfError::Duplicate { kind: "link", name: link.name, line: line(node) });
             }
             doc.links.push(link);
         }
@@ -114,11 +95,7 @@ impl Document {
         for node in children(robot, "joint") {
             let joint = doc.joint(node)?;
             if names.insert(joint.name.clone(), ()).is_some() {
-                return Err(UrdfError::Duplicate {
-                    kind: "joint",
-                    name: joint.name,
-                    line: line(node),
-                });
+                return Err(UrdfError::Duplicate { kind: "joint", name: joint.name, line: line(node) });
             }
             let index = doc.joints.len();
             let child = &mut doc.links[joint.child];
@@ -143,46 +120,27 @@ impl Document {
     /// Every link has one parent at most, so those that no root reaches hang on a loop.
     fn check_no_loop(&self) -> Result<(), UrdfError> {
         let mut reached = vec![false; self.links.len()];
-        let mut open: Vec<usize> = (0..self.links.len())
-            .filter(|&l| self.links[l].parent_joint.is_none())
-            .collect();
+        let mut open: Vec<usize> = (0..self.links.len()).filter(|&l| self.links[l].parent_joint.is_none()).collect();
         while let Some(l) = open.pop() {
             reached[l] = true;
-            open.extend(
-                self.links[l]
-                    .child_joints
-                    .iter()
-                    .map(|&j| self.joints[j].child),
-            );
+            open.extend(self.links[l].child_joints.iter().map(|&j| self.joints[j].child));
         }
         match reached.iter().position(|r| !r) {
-            Some(l) => Err(UrdfError::Loop {
-                link: self.links[l].name.clone(),
-            }),
+            Some(l) => Err(UrdfError::Loop { link: self.links[l].name.clone() }),
             None => Ok(()),
         }
     }
 
     fn joint(&self, node: Node) -> Result<RawJoint, UrdfError> {
         let name = name(node)?;
-        let text = node
-            .attribute("type")
-            .ok_or_else(|| missing(node, "type"))?;
+        let text = node.attribute("type").ok_or_else(|| missing(node, "type"))?;
         let kind = Kind::ALL
             .into_iter()
             .find(|k| k.name() == text)
-            .ok_or_else(|| UrdfError::UnknownType {
-                joint: name.clone(),
-                kind: text.into(),
-            })?;
+            .ok_or_else(|| UrdfError::UnknownType { joint: name.clone(), kind: text.into() })?;
         let end = |tag: &'static str, part: &'static str| {
-            let link = child(node, tag)
-                .and_then(|n| n.attribute("link"))
-                .ok_or_else(|| missing(node, part))?;
-            self.link(link).ok_or_else(|| UrdfError::UnknownLink {
-                joint: name.clone(),
-                link: link.into(),
-            })
+            let link = child(node, tag).and_then(|n| n.attribute("link")).ok_or_else(|| missing(node, part))?;
+            self.link(link).ok_or_else(|| UrdfError::UnknownLink { joint: name.clone(), link: link.into() })
         };
         let parent = end("parent", "<parent link=…>")?;
         let child_link = end("child", "<child link=…>")?;
@@ -192,26 +150,13 @@ impl Document {
             None => v3(1.0, 0.0, 0.0),
         };
         let limit = limit(node, kind)?;
-        Ok(RawJoint {
-            name,
-            kind,
-            parent,
-            child: child_link,
-            r,
-            p,
-            axis,
-            limit,
-            mimic: child(node, "mimic").is_some(),
-        })
+        Ok(RawJoint { name, kind, parent, child: child_link, r, p, axis, limit, mimic: child(node, "mimic").is_some() })
     }
 }
 
 fn limit(joint: Node, kind: Kind) -> Result<Limit, UrdfError> {
     let node = child(joint, "limit");
-    let number_or = |attribute, default| {
-        node.map_or(Ok(None), |n| number(n, attribute))
-            .map(|v| v.unwrap_or(default))
-    };
+    let number_or = |attribute, default| node.map_or(Ok(None), |n| number(n, attribute)).map(|v| v.unwrap_or(default));
     if kind == Kind::Revolute {
         let node = node.ok_or_else(|| missing(joint, "<limit>, which a revolute joint needs"))?;
         for attribute in ["velocity", "effort"] {
@@ -222,16 +167,8 @@ fn limit(joint: Node, kind: Kind) -> Result<Limit, UrdfError> {
     }
     let bounded = matches!(kind, Kind::Revolute | Kind::Prismatic);
     Ok(Limit {
-        lower: if bounded {
-            number_or("lower", 0.0)?
-        } else {
-            f64::NEG_INFINITY
-        },
-        upper: if bounded {
-            number_or("upper", 0.0)?
-        } else {
-            f64::INFINITY
-        },
+        lower: if bounded { number_or("lower", 0.0)? } else { f64::NEG_INFINITY },
+        upper: if bounded { number_or("upper", 0.0)? } else { f64::INFINITY },
         velocity: number_or("velocity", f64::INFINITY)?,
         effort: number_or("effort", f64::INFINITY)?,
     })
@@ -284,9 +221,7 @@ fn child<'a, 'i>(node: Node<'a, 'i>, tag: &'static str) -> Option<Node<'a, 'i>> 
 }
 
 fn name(node: Node) -> Result<String, UrdfError> {
-    node.attribute("name")
-        .map(String::from)
-        .ok_or_else(|| missing(node, "name"))
+    node.attribute("name").map(String::from).ok_or_else(|| missing(node, "name"))
 }
 
 fn required(node: Node, attribute: &'static str) -> Result<f64, UrdfError> {
@@ -297,9 +232,7 @@ fn number(node: Node, attribute: &'static str) -> Result<Option<f64>, UrdfError>
     let Some(text) = node.attribute(attribute) else {
         return Ok(None);
     };
-    finite(text)
-        .map(Some)
-        .ok_or_else(|| bad_number(node, attribute, "a finite number"))
+    finite(text).map(Some).ok_or_else(|| bad_number(node, attribute, "a finite number"))
 }
 
 fn triple(node: Node, attribute: &'static str) -> Result<Option<V3>, UrdfError> {
@@ -326,11 +259,7 @@ fn described(node: Node) -> String {
     let tag = node.tag_name().name();
     match node.attribute("name") {
         Some(name) => format!("{tag} '{name}'"),
-        None => match node
-            .ancestors()
-            .skip(1)
-            .find(|n| n.attribute("name").is_some())
-        {
+        None => match node.ancestors().skip(1).find(|n| n.attribute("name").is_some()) {
             Some(owner) => format!("<{tag}> of {}", described(owner)),
             None => format!("<{tag}>"),
         },
@@ -338,28 +267,13 @@ fn described(node: Node) -> String {
 }
 
 fn missing(node: Node, part: &'static str) -> UrdfError {
-    UrdfError::Missing {
-        element: described(node),
-        line: line(node),
-        part,
-    }
+    UrdfError::Missing { element: described(node), line: line(node), part }
 }
 
 fn bad_number(node: Node, attribute: &'static str, expected: &'static str) -> UrdfError {
-    let mut text: String = node
-        .attribute(attribute)
-        .unwrap_or_default()
-        .chars()
-        .take(60)
-        .collect();
+    let mut text: String = node.attribute(attribute).unwrap_or_default().chars().take(60).collect();
     if text.is_empty() {
         text = "(empty)".into();
     }
-    UrdfError::BadNumber {
-        element: described(node),
-        line: line(node),
-        attribute,
-        text,
-        expected,
-    }
+    UrdfError::BadNumber { element: described(node), line: line(node), attribute, text, expected }
 }

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Speed and size of the rack, with the machine's conditions. Wall-clock figures of a shared machine: compare within one
-# run. ./scripts/bench.sh [--outside] — with --outside also Pinocchio and MuJoCo (needs their PyPI packages).
+# run. ./scripts/bench.sh [--outside|--outside-only] — with --outside also a table beside Pinocchio and MuJoCo, whose PyPI
+# packages it installs into the build folder.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/setup.sh
@@ -14,7 +15,26 @@ end() {
 }
 trap end EXIT
 
+# the arm's algorithms, a control step and a plant step beside Pinocchio (two builds) and MuJoCo, in one run
+outside() {
+    local python
+    python=$(./scripts/python-env.sh outside)
+    {
+        cargo bench --quiet -p arm --bench algorithms | sed 's/^/vmerack /'
+        "$release/examples/control_step" | awk '/^round/ { if (!n || $3 < n) n = $3 } END { print "vmerack control_step", n }'
+        "$release/examples/plant_step" | sed 's/^/vmerack /'
+        "$python" scripts/reference/bench_outside.py
+    } | awk -f scripts/reference/side_by_side.awk
+    echo "control_step: Pinocchio's has kinematics, the 7x7 solve and RNEA only, ours AHIC, ERC and wrenches too."
+    echo "plant_step: MuJoCo's is rigid and touches nothing, ours has flexible joints, friction and contact."
+    echo "tip+rnea, tip+fd: what a control step and a plant step ask of the arm's model."
+}
+
 echo "machine: $(uname -sr), $(nproc) cores, $(sed -n 's/^model name\t*: //p' /proc/cpuinfo | head -n 1), load $(cut -d' ' -f1-3 /proc/loadavg)"
+if [ "${1:-}" = --outside-only ]; then
+    outside
+    exit
+fi
 
 # wall time of the windows of Table 5-3, one variant, best of five, and how many times faster than real time
 rack() {
@@ -97,9 +117,8 @@ hogs=()
 echo
 echo "integration of the plant"
 "$release/examples/integrators"
+"$release/examples/plant_step"
 if [ "${1:-}" = --outside ]; then
     echo
-    echo "arm algorithms, ns a call"
-    cargo bench --quiet -p arm --bench algorithms
-    python3 scripts/reference/bench_outside.py
+    outside
 fi

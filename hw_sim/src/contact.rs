@@ -64,6 +64,14 @@ impl Contact {
         }
     }
 
+    /// Square of the longest lever from the tool point at which it can press, m².
+    pub fn lever_squared(&self) -> f64 {
+        match self {
+            Contact::Plane(_) => 0.0,
+            Contact::Peg(peg) => peg.peg_radius * peg.peg_radius + peg.depth * peg.depth,
+        }
+    }
+
     /// What it is made of.
     pub fn material(&self) -> &Material {
         match self {

@@ -5,9 +5,6 @@
 use crate::friction::{Bristle, JointFriction, within};
 use arm::drives::JointDrive;
 
-/// Natural frequency of a rotor held by its brake, rad/s: the brake's disc and hub are no rigid body either.
-const BRAKE_FREQUENCY: f64 = 300.0;
-
 /// Drive of one joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drive {
@@ -65,7 +62,7 @@ impl Drive {
             torque_per_volt: data.amplifier_nm_per_v,
             torque_limit: data.torque_limit_nm,
             friction: JointFriction::new(data, friction_scale),
-            brake: Bristle::holding(braked_inertia * BRAKE_FREQUENCY * BRAKE_FREQUENCY, braked_inertia),
+            brake: Bristle::holding(data.brake_stiffness_nm_per_rad(braked_inertia), braked_inertia),
             brake_capacity: data.brake_nm,
             kinematic_error: with_kinematic_error.then(|| KinematicError::new(data)),
         }
@@ -114,11 +111,6 @@ impl Drive {
             theta = q + torque / self.stiffness - error;
         }
         theta
-    }
-
-    /// Stiffness of the sticking friction and the engaged brake together, Nm/rad.
-    pub fn holding_stiffness(&self) -> f64 {
-        self.friction.stiffness() + self.brake.stiffness
     }
 }
 

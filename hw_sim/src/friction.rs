@@ -67,27 +67,17 @@ pub struct JointFriction {
 }
 
 impl JointFriction {
-    /// Friction of `drive`, all of it times `scale`. The bristle is as stiff as makes the unloaded joint yield after the
-    /// drive's presliding deflection; under load it yields later.
+    /// Friction of `drive`, all of it times `scale`.
     pub fn new(drive: &JointDrive, scale: f64) -> JointFriction {
-        // a drive whose friction is the load's alone has its bristle from the load at the torque limit
-        let nominal = match drive.coulomb_nm > 0.0 {
-            true => drive.breakaway_at_load_nm(0.0),
-            false => drive.breakaway_at_load_nm(drive.torque_limit_nm),
-        };
+        let stiffness = drive.sticking_stiffness_nm_per_rad(scale);
         JointFriction {
             coulomb: scale * drive.coulomb_nm,
             load_part: scale * drive.load_part,
             viscous: scale * drive.viscous_nms_per_rad,
             stribeck_rise: drive.breakaway_ratio - 1.0,
             per_stribeck_speed: 1.0 / drive.stribeck_speed_rad_per_s,
-            bristle: Bristle::holding(scale * nominal / drive.presliding_rad, drive.rotor_inertia_at_output_kg_m2),
+            bristle: Bristle::holding(stiffness, drive.rotor_inertia_at_output_kg_m2),
         }
-    }
-
-    /// Stiffness of the sticking joint, Nm/rad.
-    pub fn stiffness(&self) -> f64 {
-        self.bristle.stiffness
     }
 
     /// Largest dry friction at speed `v` (rad/s) while the transmission carries `load` (Nm): breakaway at rest.

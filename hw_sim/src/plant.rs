@@ -3,11 +3,11 @@
 //! Flexible joints (Spong), in output-side quantities: M(q)q̈ + h = τ_s + Jᵀ(−F_e) on the link side and
 //! N²J_m (θ̈/N) = τ_m − τ_f − τ_brake − τ_s on the motor side. Rigid joints: (M + N²J_m)q̈ + h = τ_m − τ_f − τ_brake − JᵀF_e.
 
-use crate::contact::{Contact, Plane, Touch};
+use crate::contact::{Contact, PegInHole, Plane, Touch};
 use crate::drive::{Drive, RotorLoss, Transmission};
 use crate::sensor::Sensor;
 use crate::state::{CONTACT_POINTS, State};
-use arm::{ArmModel, ArmState, DOF, JointMatrix, JointVector, Pose, Spatial};
+use arm::{ArmModel, ArmState, DOF, JointVector, Pose, Spatial};
 use messages::AmplifierCommand;
 use scenario::{Joints, Scenario};
 
@@ -25,10 +25,6 @@ pub struct Plant {
     /// Strain gauges between flange and tool.
     pub sensor: Sensor,
 }
-
-/// Largest angle by which the fastest oscillation may turn in one step: semi-implicit Euler is stable below 2, Runge–Kutta
-/// below 2.8; the rest is for postures in which the arm is lighter than at the start.
-const LARGEST_PHASE_STEP: f64 = 1.0;
 
 /// Share of the tool's speed into a surface that the contact's damper may take in one step.
 const LARGEST_DAMPER_STEP: f64 = 0.5;
@@ -86,20 +82,22 @@ impl Plant {
         let data = scenario.drives()?;
         let q = scenario.initial_posture()?;
         let plant = &scenario.plant;
-        let rotors = data.each(|drive| drive.rotor_inertia_at_output_kg_m2);
-        let braked = match plant.joints {
-            Joints::Flexible => rotors,
-            Joints::Rigid => rotors + felt_inertia(&arm, &q)?,
-        };
-        let contacts: Vec<Contact> =
-            scenario.surfaces.iter().map(|surface| Contact::Plane(Plane::from_surface(scenario, surface))).collect();
+        let stiffness = scenario.stiffness().map_err(|problem| format!("{}: {}", problem.key, problem.message))?;
+        let planes = scenario.surfaces.iter().map(|surface| Contact::Plane(Plane::from_surface(scenario, surface)));
+        let pegs = scenario.holes.iter().map(|hole| Contact::Peg(PegInHole::from_hole(scenario, hole)));
+        let mut contacts: Vec<Contact> = planes.chain(pegs).collect();
         let points: usize = contacts.iter().map(Contact::points).sum();
         if points > CONTACT_POINTS {
-            return Err(format!("the surfaces have {points} contact points, expected at most {CONTACT_POINTS}"));
+            return Err(format!("surfaces and hole have {points} contact points, expected at most {CONTACT_POINTS}"));
         }
-        let mut plant = Plant {
+        for contact in &mut contacts {
+            let mobility = stiffness.tool_mobility + contact.lever_squared() * stiffness.turning_mobility;
+            contact.limit_damping(LARGEST_DAMPER_STEP * plant.rate_hz / mobility);
+        }
+        let plant = Plant {
             drives: std::array::from_fn(|i| {
-                Drive::new(&data.joints[i], plant.friction_scale, plant.kinematic_error, braked[i])
+                let braked = stiffness.braked_inertia[i];
+                Drive::new(&data.joints[i], plant.friction_scale, plant.kinematic_error, braked)
             }),
             joints: plant.joints,
             contacts,
@@ -107,59 +105,7 @@ impl Plant {
             arm,
         };
         let state = plant.braked_at_rest(q);
-        let (rate, mobility) = (scenario.plant.rate_hz, plant.tool_mobility(&q, &rotors));
-        let fastest = plant.fastest_frequency(&q, &rotors, mobility);
-        let least = fastest / LARGEST_PHASE_STEP;
-        // no frequency is no answer either
-        if least.is_nan() || rate < least {
-            return Err(format!(
-                "plant.rate_hz = {rate}: drives, brakes and surfaces of this stiffness swing at up to {:.0} Hz and need at least {least:.0} steps a second",
-                fastest / std::f64::consts::TAU
-            ));
-        }
-        for contact in &mut plant.contacts {
-            contact.limit_damping(LARGEST_DAMPER_STEP * rate / mobility);
-        }
         Ok((plant, state))
-    }
-
-    /// Mass matrix of what moves with the links.
-    fn moving_mass(&self, q: &JointVector, rotors: &JointVector) -> JointMatrix {
-        let mut mass = arm::crba(&self.arm, q);
-        if self.joints == Joints::Rigid {
-            for i in 0..DOF {
-                mass[(i, i)] += rotors[i];
-            }
-        }
-        mass
-    }
-
-    /// Sum of the reciprocal masses that forces on the tool along x, y and z feel, 1/kg.
-    fn tool_mobility(&self, q: &JointVector, rotors: &JointVector) -> f64 {
-        let Some(inverse) = self.moving_mass(q, rotors).try_inverse() else {
-            return f64::NAN;
-        };
-        let jacobian = arm::jacobian(&self.arm, q);
-        (0..3).map(|k| (jacobian.row(k) * inverse * jacobian.row(k).transpose())[0]).sum()
-    }
-
-    /// Upper bound of the natural frequencies at a posture, rad/s: everything sticks and the tool is in contact. The sum of
-    /// the bounds of each kind of spring (Weyl).
-    fn fastest_frequency(&self, q: &JointVector, rotors: &JointVector, tool_mobility: f64) -> f64 {
-        let Some(inverse) = self.moving_mass(q, rotors).try_inverse() else {
-            return f64::NAN;
-        };
-        let flexible = self.joints == Joints::Flexible;
-        let on_link = |drive: &Drive| {
-            if flexible { drive.stiffness } else { drive.holding_stiffness() }
-        };
-        let on_rotor = |drive: &Drive| {
-            if flexible { (drive.stiffness + drive.holding_stiffness()) / drive.rotor } else { 0.0 }
-        };
-        let links: f64 = (0..DOF).map(|i| on_link(&self.drives[i]) * inverse[(i, i)]).sum();
-        let rotors = self.drives.iter().map(on_rotor).fold(0.0, f64::max);
-        let surface = self.contacts.iter().map(|contact| contact.material().stiffness).fold(0.0, f64::max);
-        (links + rotors + tool_mobility * surface).sqrt()
     }
 
     /// At rest with every brake engaged and carrying the arm's weight: nothing moves when time starts.
@@ -239,10 +185,4 @@ impl Plant {
             first += contact.points();
         }
     }
-}
-
-/// Inertia that a torque on one joint feels while the others are free, 1/(M⁻¹)_ii, kg m².
-fn felt_inertia(arm: &ArmModel, q: &JointVector) -> Result<JointVector, String> {
-    let inverse = arm::crba(arm, q).try_inverse().ok_or("the arm's mass matrix at the start posture is singular")?;
-    Ok(JointVector::from_fn(|i, _| 1.0 / inverse[(i, i)]))
 }

@@ -6,7 +6,7 @@ wheel's library, called from C++. Without g++, the Python calls are timed instea
 (1-3 microseconds of each such figure are the call from Python). Needs scripts/reference/requirements.txt. The
 programs are compiled once (minutes), into the build folder, and again only when their source is newer.
 
-    .venv/bin/python scripts/reference/bench_outside.py
+    $(./scripts/python-env.sh outside) scripts/reference/bench_outside.py
 """
 import os
 import shutil

@@ -10,6 +10,8 @@
 #include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 
+#include <Eigen/Cholesky>
+
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -94,6 +96,19 @@ int main() {
     });
     bench("aba", states, [&](const State &s) { pin::aba(model, data, s.q, s.qd, s.x); });
     Vector wanted(model.nv);
+    // what a control step needs besides the control law: kinematics, weighted least squares, inverse dynamics
+    Eigen::Matrix<double, 7, 7> normal;
+    Eigen::LLT<Eigen::Matrix<double, 7, 7>> factors;
+    bench("control_step", states, [&](const State &s) {
+        tip_motion(s);
+        normal.noalias() = jacobian.transpose() * jacobian;
+        normal.diagonal().array() += 1e-3;
+        wanted.noalias() = jacobian.transpose() * drift;
+        wanted -= 2e-3 * s.qd;
+        factors.compute(normal);
+        factors.solveInPlace(wanted);
+        pin::rnea(model, data, s.q, s.qd, wanted);
+    });
     bench("tip+rnea", states, [&](const State &s) {
         tip_motion(s);
         wanted.noalias() = jacobian.transpose() * drift;

@@ -7,11 +7,21 @@
 use super::{Material, Touch};
 use arm::{Pose, Spatial};
 use nalgebra::{Matrix3, Vector3};
+use scenario::{Hole, Scenario};
+use std::sync::LazyLock;
 
 /// Points on the rim, and on the lip.
-const SAMPLES: usize = 24;
+const SAMPLES: usize = Hole::SAMPLES;
 /// Contact points of one peg and hole.
-pub const POINTS: usize = 2 * SAMPLES;
+pub const POINTS: usize = Hole::POINTS;
+
+/// Cosine and sine of the angles at which the points sit.
+static CIRCLE: LazyLock<[(f64, f64); SAMPLES]> = LazyLock::new(|| {
+    std::array::from_fn(|n| {
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * n as f64 / SAMPLES as f64);
+        (cos, sin)
+    })
+});
 
 /// A peg on the tool and a hole in the base. The stiffness of `material` is that of one point.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,9 +56,28 @@ struct Point {
 }
 
 impl PegInHole {
+    /// The peg and hole that a scenario describes.
+    pub fn from_hole(scenario: &Scenario, hole: &Hole) -> PegInHole {
+        let frame = scenario.task_frame();
+        PegInHole {
+            peg_radius: hole.peg_radius_m,
+            peg_length: hole.peg_length_m,
+            mouth: frame.p + frame.r * Vector3::from(hole.position_m),
+            axes: frame.r * hole.axes(),
+            bore_radius: hole.bore_radius_m,
+            chamfer: hole.chamfer_m,
+            depth: hole.depth_m,
+            material: Material {
+                stiffness: hole.stiffness_n_per_m,
+                hunt_crossley: hole.hunt_crossley_s_per_m,
+                friction: hole.friction,
+                damping_limit: f64::INFINITY,
+            },
+        }
+    }
+
     fn point(&self, pose: &Pose, n: usize) -> Point {
-        let angle = std::f64::consts::TAU * (n % SAMPLES) as f64 / SAMPLES as f64;
-        let (sin, cos) = libm::sincos(angle);
+        let (cos, sin) = CIRCLE[n % SAMPLES];
         if n < SAMPLES {
             self.rim(pose, Vector3::new(cos, sin, 0.0) * self.peg_radius)
         } else {

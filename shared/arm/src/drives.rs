@@ -133,6 +133,9 @@ impl DriveData {
     }
 }
 
+/// Natural frequency of a joint held by its brake, rad/s: the brake's disc and hub are no rigid body either.
+const BRAKE_FREQUENCY: f64 = 300.0;
+
 impl JointDrive {
     /// D = 2 ζ √(K N² J_m): damper beside the spring (Nm s/rad).
     pub fn damping_nms_per_rad(&self) -> f64 {
@@ -147,6 +150,22 @@ impl JointDrive {
     /// Torque at which a resting joint starts to slide while the spring carries `load_nm` (Nm).
     pub fn breakaway_at_load_nm(&self, load_nm: f64) -> f64 {
         self.breakaway_ratio * self.coulomb_at_load_nm(load_nm)
+    }
+
+    /// Stiffness of the sticking joint, its friction times `friction_scale` (Nm/rad): an unloaded joint yields after the
+    /// presliding deflection; under load it yields later.
+    pub fn sticking_stiffness_nm_per_rad(&self, friction_scale: f64) -> f64 {
+        // a drive whose friction is the load's alone has its bristle from the load at the torque limit
+        let nominal = match self.coulomb_nm > 0.0 {
+            true => self.breakaway_at_load_nm(0.0),
+            false => self.breakaway_at_load_nm(self.torque_limit_nm),
+        };
+        friction_scale * nominal / self.presliding_rad
+    }
+
+    /// Stiffness of the engaged brake that holds an inertia at the output (kg m²), Nm/rad.
+    pub fn brake_stiffness_nm_per_rad(&self, held_kg_m2: f64) -> f64 {
+        held_kg_m2 * BRAKE_FREQUENCY * BRAKE_FREQUENCY
     }
 
     /// Kinematic error of the gear at the output (rad) for a motor angle in rad.

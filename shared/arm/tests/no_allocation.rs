@@ -41,6 +41,8 @@ fn no_algorithm_allocates() {
         sum += crba(model, &q).sum() + aba(model, &q, &qd, &q, &qd.abs(), &Spatial::repeat(1.0)).sum();
         let state = ArmState::new(model, &q, &qd);
         sum += state.mass_matrix().sum() + state.rnea(&q).sum() + state.tip_motion().twist.sum();
+        sum += state.accelerations(&q, &qd.abs(), &Spatial::repeat(1.0)).sum() + state.tip_acceleration(&q).sum();
+        sum += state.potential_energy();
         // a large angle, whose reduction takes another way
         sum += rnea(model, &JointVector::repeat(1e9), &qd, &q).sum();
     }

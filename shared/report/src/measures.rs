@@ -5,7 +5,7 @@ use crate::segments::SegmentRow;
 use crate::series::Series;
 use crate::trace::Trace;
 use messages::JOINTS;
-use scenario::{Measure, Scenario};
+use scenario::{Hole, Measure, Scenario};
 use serde::Serialize;
 
 /// One number each; `None` where it does not exist.
@@ -31,6 +31,10 @@ pub struct RunMeasures {
     pub self_motion_rad_per_s: Option<f64>,
     /// Least distance of a joint from its limit, rad.
     pub joint_limit_distance_rad: Option<f64>,
+    /// Greatest depth of the peg's end under the hole's mouth, m.
+    pub insertion_depth_m: Option<f64>,
+    /// Greatest contact force across the hole's axis, N.
+    pub lateral_force_peak_n: Option<f64>,
     /// Share of the time for which the bus was kept.
     pub bus_load: Option<f64>,
     /// Releases lost by tasks whose job before still ran.
@@ -44,6 +48,7 @@ pub(crate) struct Bounds {
     pub torque_nm: [f64; JOINTS],
     pub lower_rad: [f64; JOINTS],
     pub upper_rad: [f64; JOINTS],
+    pub hole: Option<Hole>,
 }
 
 impl Bounds {
@@ -54,6 +59,7 @@ impl Bounds {
             torque_nm: drives.each(|joint| joint.torque_limit_nm).into(),
             lower_rad: (*arm.lower_limits()).into(),
             upper_rad: (*arm.upper_limits()).into(),
+            hole: scenario.holes.first().cloned(),
         })
     }
 }
@@ -94,6 +100,12 @@ impl RunMeasures {
                 (0..JOINTS).map(|i| -(probe.q[i] - bounds.lower_rad[i]).min(bounds.upper_rad[i] - probe.q[i]))
             }))
             .map(|least| -least),
+            insertion_depth_m: bounds.hole.as_ref().and_then(|hole| {
+                greatest(trace.plant.iter().map(|probe| hole.depth_of(probe.position)))
+            }),
+            lateral_force_peak_n: bounds.hole.as_ref().and_then(|hole| {
+                greatest(trace.plant.iter().map(|probe| lateral(&probe.contact, hole)))
+            }),
             bus_load: trace.bus.as_ref().map(|bus| bus.utilisation),
             lost_releases: trace.bus.as_ref().map(|bus| bus.lost_releases() as f64),
             sensor_to_actuator_s: trace
@@ -127,6 +139,8 @@ impl RunMeasures {
             TorqueShare => self.torque_share,
             SelfMotionRadPerS => self.self_motion_rad_per_s,
             JointLimitDistanceRad => self.joint_limit_distance_rad,
+            InsertionDepthM => self.insertion_depth_m,
+            LateralForcePeakN => self.lateral_force_peak_n,
             BusLoad => self.bus_load,
             LostReleases => self.lost_releases,
             SensorToActuatorS => self.sensor_to_actuator_s,
@@ -138,6 +152,14 @@ impl RunMeasures {
 pub(crate) fn first_contact(trace: &Trace) -> Option<f64> {
     let touches = |contact: &[f64; 6]| contact[..3].iter().any(|force| force.abs() > 1e-9);
     trace.plant.iter().find(|probe| touches(&probe.contact)).map(|probe| crate::trace::seconds(probe.t))
+}
+
+/// Part of a contact wrench's force (task frame) across a hole's axis, N.
+fn lateral(contact: &[f64; 6], hole: &Hole) -> f64 {
+    let (force, axis) = (&contact[..3], hole.axis());
+    let along: f64 = force.iter().zip(axis.iter()).map(|(f, a)| f * a).sum();
+    let square: f64 = force.iter().map(|f| f * f).sum();
+    (square - along * along).max(0.0).sqrt()
 }
 
 /// Greatest of finite numbers.
@@ -213,6 +235,19 @@ mod tests {
         let rows = [60.0, 80.0, 40.0, 0.0].map(|wanted| row(wanted, Some(0.0)));
         assert_eq!(incapable(&rows), Some(3.0));
         assert_eq!(order_violations(&rows), Some(6.0));
+    }
+
+    #[test]
+    fn the_lateral_force_is_the_part_across_a_tilted_holes_axis() {
+        let document = scenario::load("peg-in-hole", &["hole.0.tilt_deg=[0.0, 30.0]".into()]).expect("valid");
+        let hole = document.scenario().expect("valid").holes.remove(0);
+        let axis = hole.axis();
+        let along = [3.0 * axis.x, 3.0 * axis.y, 3.0 * axis.z, 0.0, 0.0, 0.0];
+        assert!(lateral(&along, &hole) < 1e-7);
+        assert!((lateral(&[0.0, 0.0, 2.0, 0.0, 0.0, 0.0], &hole) - 1.0).abs() < 1e-12);
+        assert!((lateral(&[0.0, 5.0, 0.0, 0.0, 0.0, 9.0], &hole) - 5.0).abs() < 1e-12);
+        let at = |depth: f64| std::array::from_fn(|k| hole.position_m[k] + depth * axis[k]);
+        assert!((hole.depth_of(at(0.02)) - 0.02).abs() < 1e-15);
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub const SCENARIOS: &[(&str, &str)] = &[
     ("figure-6-6", include_str!("../../scenarios/figure-6-6.toml")),
     ("after-6-6", include_str!("../../scenarios/after-6-6.toml")),
     ("surface-cleaning", include_str!("../../scenarios/surface-cleaning.toml")),
+    ("peg-in-hole", include_str!("../../scenarios/peg-in-hole.toml")),
     ("self-motion", include_str!("../../scenarios/self-motion.toml")),
     ("joint-limits", include_str!("../../scenarios/joint-limits.toml")),
     ("friction-compensation", include_str!("../../scenarios/friction-compensation.toml")),

@@ -15,6 +15,7 @@ pub(crate) fn check(scenario: &Scenario) -> Result {
     controller(&scenario.controller)?;
     segments(scenario)?;
     surfaces(scenario)?;
+    holes(scenario)?;
     rack(scenario)?;
     crate::faults::check(scenario)?;
     within("safety.max_force_age_ms", scenario.safety.max_force_age_ms, 0.0..=10_000.0, "0 to 10000")?;
@@ -22,7 +23,8 @@ pub(crate) fn check(scenario: &Scenario) -> Result {
     processes(scenario)?;
     realtime(scenario)?;
     variants_and_limits(scenario)?;
-    reach(scenario)
+    reach(scenario)?;
+    scenario.stiffness().map(|_| ())
 }
 
 fn within(key: impl Into<String>, value: f64, range: std::ops::RangeInclusive<f64>, expected: &str) -> Result {
@@ -137,16 +139,44 @@ fn segments(scenario: &Scenario) -> Result {
     within("duration_s", scenario.duration(), 1e-3..=36_000.0, "0.001 to 36000")
 }
 
+/// At c v = 2/3, v the speed of impact, a contact takes all of it; 10 s/m does that to a touch of 7 cm/s already.
+const HUNT_CROSSLEY_MAX: f64 = 10.0;
+const HUNT_CROSSLEY: &str = "0 to 10: no material takes more from a slow touch";
+
 fn surfaces(scenario: &Scenario) -> Result {
     for (i, surface) in scenario.surfaces.iter().enumerate() {
         let key = |name: &str| format!("surface.{i}.{name}");
         within(key("stiffness_n_per_m"), surface.stiffness_n_per_m, 1.0..=1e6, "1 to 1e6")?;
-        within(key("hunt_crossley_s_per_m"), surface.hunt_crossley_s_per_m, 0.0..=1000.0, "0 to 1000")?;
+        within(key("hunt_crossley_s_per_m"), surface.hunt_crossley_s_per_m, 0.0..=HUNT_CROSSLEY_MAX, HUNT_CROSSLEY)?;
         within(key("friction"), surface.friction, 0.0..=2.0, "0 to 2")?;
         all(&key("tilt_deg"), &surface.tilt_deg, |key, tilt| within(key, tilt, -60.0..=60.0, "-60 to 60"))?;
         if let Some(half) = &surface.half_size_m {
             all(&key("half_size_m"), half, positive)?;
         }
+    }
+    Ok(())
+}
+
+fn holes(scenario: &Scenario) -> Result {
+    if scenario.holes.len() > 1 {
+        return Err(Problem::new("hole.1.name", "a second hole: the tool carries one peg, expected one [[hole]]"));
+    }
+    for (i, hole) in scenario.holes.iter().enumerate() {
+        let key = |name: &str| format!("hole.{i}.{name}");
+        all(&key("tilt_deg"), &hole.tilt_deg, |key, tilt| within(key, tilt, -30.0..=30.0, "-30 to 30"))?;
+        within(key("bore_radius_m"), hole.bore_radius_m, 1e-3..=1.0, "0.001 to 1")?;
+        let widest = hole.bore_radius_m;
+        positive(key("peg_radius_m"), hole.peg_radius_m)?;
+        within(key("peg_radius_m"), hole.peg_radius_m, 0.0..=widest, &format!("a peg that fits, at most the bore's {widest}"))?;
+        positive(key("peg_length_m"), hole.peg_length_m)?;
+        not_negative(key("chamfer_m"), hole.chamfer_m)?;
+        within(key("depth_m"), hole.depth_m, hole.chamfer_m + 1e-6..=10.0, "a floor below the chamfer, at most 10")?;
+        within(key("stiffness_n_per_m"), hole.stiffness_n_per_m, 1.0..=1e6, "1 to 1e6")?;
+        within(key("hunt_crossley_s_per_m"), hole.hunt_crossley_s_per_m, 0.0..=HUNT_CROSSLEY_MAX, HUNT_CROSSLEY)?;
+        within(key("friction"), hole.friction, 0.0..=2.0, "0 to 2")?;
+        let depth = hole.depth_of(scenario.arm.start_position_m);
+        let room = hole.peg_radius_m * hole.tilt_deg.iter().map(|tilt| tilt.to_radians().abs()).sum::<f64>();
+        within(key("position_m"), -depth, room..=f64::MAX, "the peg's start in front of the hole (its start penetrates it)")?;
     }
     Ok(())
 }
@@ -292,6 +322,10 @@ fn reach(scenario: &Scenario) -> Result {
     for (i, segment) in scenario.resolved_segments().iter().enumerate() {
         let pose = scenario.base_pose(segment.position_m, segment.rpy_deg);
         q = crate::inverse_kinematics(&arm, &pose, &q).map_err(|error| Problem::new(format!("segment.{i}.position_m"), error.to_string()))?;
+    }
+    for (i, hole) in scenario.holes.iter().enumerate() {
+        let at = scenario.base_pose(hole.position_m, [0.0; 3]).p.norm();
+        within(format!("hole.{i}.position_m"), at, 0.0..=arm.reach_bound(), &format!("a hole within {:.3} m of the base", arm.reach_bound()))?;
     }
     let frame = scenario.task_frame();
     let shoulder = nalgebra::Vector3::zeros();

@@ -120,6 +120,23 @@ pub fn nanoseconds(seconds: f64) -> vme::Ns {
     (seconds * 1e9).round() as vme::Ns
 }
 
+impl crate::Hole {
+    /// Axis of the hole in the task frame, into it: z tilted about x, then y.
+    pub fn axis(&self) -> Vector3<f64> {
+        self.axes() * Vector3::z()
+    }
+
+    /// Axes of the hole in the task frame.
+    pub fn axes(&self) -> Matrix3<f64> {
+        rpy_deg([self.tilt_deg[0], self.tilt_deg[1], 0.0])
+    }
+
+    /// How deep a point of the task frame lies under the mouth's plane, m.
+    pub fn depth_of(&self, position_m: [f64; 3]) -> f64 {
+        self.axis().dot(&(Vector3::from(position_m) - Vector3::from(self.position_m)))
+    }
+}
+
 impl crate::Surface {
     /// Outward normal of the plane in the task frame: −z tilted about x, then y.
     pub fn normal(&self) -> Vector3<f64> {

@@ -10,16 +10,18 @@ mod check;
 mod error;
 mod faults;
 mod hardware;
+mod integrable;
 mod load;
 pub mod model;
 mod overrides;
 mod posture;
 
 pub use check::warnings;
-pub use error::ScenarioError;
 pub use faults::Occurrence;
+pub use error::{Problem, ScenarioError};
 pub use load::{Document, load};
 pub use model::*;
+pub use integrable::Stiffness;
 pub use hardware::{nanoseconds, rpy_deg};
 pub use posture::{PostureError, inverse_kinematics};
 

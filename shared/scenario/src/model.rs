@@ -4,6 +4,7 @@
 
 mod controller;
 mod fault;
+mod hole;
 mod interfaces;
 mod limit;
 mod plant;
@@ -12,6 +13,7 @@ mod segment;
 
 pub use controller::{Controller, JointLimitTask, Scheme};
 pub use fault::{Fault, FaultKind};
+pub use hole::Hole;
 pub use interfaces::{DaIo, EncoderIf, ForceSensorIf, ForceFilter, VelocitySource};
 pub use limit::{Limit, Measure};
 pub use plant::{Arm, Robot, Integrator, Joints, MismatchConfig, Plant, Surface, TaskFrame, ToolModel};
@@ -47,6 +49,9 @@ pub struct Scenario {
     /// Surfaces that the tool may touch.
     #[serde(default, rename = "surface")]
     pub surfaces: Vec<Surface>,
+    /// A hole for the peg that the tool then carries.
+    #[serde(default, rename = "hole", skip_serializing_if = "Vec::is_empty")]
+    pub holes: Vec<Hole>,
     /// Force-sensor receiver card.
     #[serde(default)]
     pub force_sensor_if: ForceSensorIf,

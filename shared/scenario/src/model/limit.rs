@@ -70,6 +70,10 @@ pub enum Measure {
     SelfMotionRadPerS,
     /// Per run: least distance of a joint from its limit, rad.
     JointLimitDistanceRad,
+    /// Per run: greatest depth of the peg's end under the hole's mouth, m.
+    InsertionDepthM,
+    /// Per run: greatest contact force across the hole's axis, N.
+    LateralForcePeakN,
     /// Per run: share of the time for which somebody kept the bus.
     BusLoad,
     /// Per run: releases lost by tasks whose job before still ran.

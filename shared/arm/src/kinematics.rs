@@ -171,7 +171,7 @@ pub fn forward_kinematics(model: &ArmModel, q: &JointVector) -> Pose {
 /// Origins of the joints, base first, and of the tip, in the base frame (m): the arm as a picture shows it.
 pub fn joint_origins(model: &ArmModel, q: &JointVector) -> [nalgebra::Vector3<f64>; DOF + 1] {
     let frames = Frames::new(model, q);
-    std::array::from_fn(|i| frames.o.get(i).copied().unwrap_or(frames.tip).into())
+    frames.o.map(|o| V3::from(o).into())
 }
 
 /// Geometric Jacobian: twist of the tip = J q̇.

@@ -156,5 +156,5 @@ fn a_finished_run_leaves_its_results_and_nothing_else() {
     let mut files: Vec<_> =
         std::fs::read_dir(bench.path("out")).expect("results").flatten().map(|file| file.file_name()).collect();
     files.sort();
-    assert_eq!(files, ["nominal.mcap", "report.html", "report.json"]);
+    assert_eq!(files, ["charts.json", "nominal.mcap", "report.html", "report.json"]);
 }

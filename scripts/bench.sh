@@ -65,6 +65,37 @@ racks ", two hogs"
 kill "${hogs[@]}"
 hogs=()
 
+# wall time of the windows of SCENARIO's VARIANT over SECONDS, recording off, best of five
+windows() {
+    local scenario=$1 variant=$2 seconds=$3 best= wall
+    shift 3
+    for _ in 1 2 3 4 5; do
+        "$release/vmerack" run "$scenario" --variant "$variant" --duration "$seconds" --set 'report.sweep=[]' --no-record --out "$out" --json "$@" >"$out/stdout.json" || true
+        wall=$(sed -n 's/^ *"wall_s": \([0-9.]*\),*$/\1/p' "$out/stdout.json" | head -n 1)
+        best=$(awk -v a="$wall" -v b="${best:-$wall}" 'BEGIN { print a < b ? a : b }')
+    done
+    echo "$best"
+}
+times() {
+    awk -v n="$1" -v w="$2" -v s="$3" 'BEGIN { printf "%-56s %8.3f s %8.1f x real time\n", n, w, s / w }'
+}
+
+echo
+echo "the timing plane: lock step across processes, recording off"
+full=$(windows table-5-3 modified 13)
+constant=$(windows table-5-3 modified 13 --set rack.bus.constant_ns=700)
+times "bus, processors and interrupts modelled" "$full" 13
+times "constant latencies" "$constant" 13
+awk -v a="$full" -v b="$constant" 'BEGIN { printf "the model costs %.1f %% (limit 20)\n", 100 * (a / b - 1) }'
+times "two cards, the second at 1 kHz (limit 10)" "$(windows processor-time two-cards-1-khz 5)" 5
+# a whole control job at every sample of the force card, on a modern board
+times "force-card interrupts at 8 kHz (limit 1)" "$(windows table-5-3 modified 3 \
+    --set controller.processor=modern --set rack.tasks.control.period_ns=125000 \
+    --set 'rack.tasks.control.release={ interrupt = "force-sample" }' \
+    --set 'rack.interrupters.force-sample.ticks={ period_ns = 125000 }')" 3
+echo "arbiter alone (limit 5 M transfers/s), and the nominal window of the timing plane alone"
+cargo bench --quiet -p vme --bench bus
+
 echo
 echo "whole command, 0.005 s of simulated time, seconds of wall time (start-up, report and shut-down)"
 for _ in 1 2 3; do

@@ -32,6 +32,8 @@ EXPECTED = {
     "/tf": "tf2_msgs/msg/TFMessage",
     "/tf_static": "tf2_msgs/msg/TFMessage",
     "/tool": "geometry_msgs/msg/PoseStamped",
+    "/vme/latency": "rack_msgs/msg/Latency",
+    "/vme/masters": "rack_msgs/msg/MasterUse",
     "/vme/transfers": "rack_msgs/msg/Transfers",
     "/wrench": "geometry_msgs/msg/WrenchStamped",
 }
@@ -62,6 +64,10 @@ def summary(topic, message):
             message.window_until,
             [(t.requested, t.data_at, t.done, t.address, t.job, t.index, t.slave, t.status) for t in message.transfers],
         ]
+    if topic == "/vme/latency":
+        return [message.job, message.whole, message.filter, message.execution, message.write]
+    if topic == "/vme/masters":
+        return [message.master, message.transfers, message.held, message.utilisation, list(message.wait)]
     if topic == "/control/state":
         return [message.job, message.force_age_ns, list(message.torque), message.xt.position.z, message.fd.force.z]
     if topic == "/plant/state":

@@ -25,6 +25,7 @@ pub struct BusAnalyzer {
     sequence: [u32; TOPICS.len()],
     events: Vec<Event>,
     joints: [String; JOINTS],
+    masters: Vec<String>,
     urdf: String,
     base_link: String,
     task_position: [f64; 3],
@@ -34,11 +35,7 @@ pub struct BusAnalyzer {
 impl BusAnalyzer {
     /// A recorder that writes to `path`, where given. `resolved_toml` is attached to the record. The
     /// error says which file and why.
-    pub fn new(
-        scenario: &Scenario,
-        path: Option<&Path>,
-        resolved_toml: &str,
-    ) -> Result<BusAnalyzer, String> {
+    pub fn new(scenario: &Scenario, path: Option<&Path>, resolved_toml: &str) -> Result<BusAnalyzer, String> {
         let description = robot::describe(scenario)?;
         let frame = scenario.task_frame();
         let record = match path {
@@ -56,6 +53,7 @@ impl BusAnalyzer {
             sequence: [0; TOPICS.len()],
             events: Vec::with_capacity(64),
             joints: scenario.controller_arm()?.joint_names().clone(),
+            masters: masters(scenario),
             urdf: description.urdf,
             base_link: description.base_link,
             task_position: frame.p.into(),
@@ -86,26 +84,14 @@ impl BusAnalyzer {
         self.emit(Topic::RobotDescription, 0);
         self.cdr.begin();
         let task = (&self.task_position, &self.task_orientation);
-        encode::transforms(
-            &mut self.cdr,
-            0,
-            &self.base_link,
-            &[(encode::TASK_FRAME, task)],
-        );
+        encode::transforms(&mut self.cdr, 0, &self.base_link, &[(encode::TASK_FRAME, task)]);
         self.emit(Topic::TfStatic, 0);
     }
 
     fn plant(&mut self, probe: &PlantProbe) {
         let t = probe.t;
         self.cdr.begin();
-        encode::joint_state(
-            &mut self.cdr,
-            t,
-            &self.joints,
-            &probe.q,
-            &probe.qd,
-            &probe.spring_torque,
-        );
+        encode::joint_state(&mut self.cdr, t, &self.joints, &probe.q, &probe.qd, &probe.spring_torque);
         self.emit(Topic::PlantJointStates, t);
         self.cdr.begin();
         encode::wrench_stamped(&mut self.cdr, t, &probe.contact);
@@ -124,23 +110,12 @@ impl BusAnalyzer {
         let target = (&probe.xt, &probe.xt_orientation);
         let desired = (&probe.xd, &probe.xd_orientation);
         self.cdr.begin();
-        encode::joint_state(
-            &mut self.cdr,
-            t,
-            &self.joints,
-            &probe.q,
-            &probe.qd,
-            &probe.torque,
-        );
+        encode::joint_state(&mut self.cdr, t, &self.joints, &probe.q, &probe.qd, &probe.torque);
         self.emit(Topic::JointStates, t);
         self.cdr.begin();
         encode::wrench_stamped(&mut self.cdr, t, &probe.fe);
         self.emit(Topic::Wrench, t);
-        for (topic, pose) in [
-            (Topic::Tool, tool),
-            (Topic::Target, target),
-            (Topic::Desired, desired),
-        ] {
+        for (topic, pose) in [(Topic::Tool, tool), (Topic::Target, target), (Topic::Desired, desired)] {
             self.cdr.begin();
             encode::pose_stamped(&mut self.cdr, t, pose);
             self.emit(topic, t);
@@ -159,15 +134,8 @@ impl BusAnalyzer {
         let mut sorted = std::mem::take(&mut self.events);
         sorted.clear();
         sorted.extend_from_slice(events);
-        sorted.sort_unstable_by_key(|event| {
-            (
-                event.t,
-                event.kind,
-                event.severity,
-                event.a.to_bits(),
-                event.b.to_bits(),
-            )
-        });
+        sorted
+            .sort_unstable_by_key(|event| (event.t, event.kind, event.severity, event.a.to_bits(), event.b.to_bits()));
         for event in &sorted {
             self.cdr.begin();
             encode::event(&mut self.cdr, event);
@@ -192,10 +160,7 @@ impl BusAnalyzer {
 
     fn give_up(&mut self, at: Ns, error: &mcap::McapError) {
         self.record = None;
-        self.lost = Some(Lost {
-            at,
-            reason: reason(error),
-        });
+        self.lost = Some(Lost { at, reason: reason(error) });
     }
 }
 
@@ -219,6 +184,17 @@ impl Board for BusAnalyzer {
             self.control(probe);
         }
         self.happened(&mail.events);
+        for used in &mail.masters {
+            let name = self.masters.get(used.master as usize).map_or("", String::as_str);
+            self.cdr.begin();
+            encode::master_use(&mut self.cdr, used, name);
+            self.emit(Topic::Masters, used.t);
+        }
+        for path in &mail.paths {
+            self.cdr.begin();
+            encode::latency(&mut self.cdr, path);
+            self.emit(Topic::Latency, path.t);
+        }
         self.cdr.begin();
         encode::transfers(&mut self.cdr, inputs.from, inputs.until, &mail.transfers);
         self.emit(Topic::Transfers, inputs.until);
@@ -229,30 +205,21 @@ impl Board for BusAnalyzer {
             self.give_up(inputs.until, &error);
         }
         if recorded && let Some(lost) = &self.lost {
-            out.mail.events.push(Event::new(
-                lost.at,
-                EventKind::RecordLost,
-                Severity::Error,
-                0.0,
-                0.0,
-            ));
+            out.mail.events.push(Event::new(lost.at, EventKind::RecordLost, Severity::Error, 0.0, 0.0));
         }
     }
 }
 
+/// Masters on the bus, as the timing plane numbers them.
+fn masters(scenario: &Scenario) -> Vec<String> {
+    let timing = vme::Timing::new(scenario.rack.clone());
+    let name = |timing: &vme::Timing| (0..).map_while(|i| timing.master_name(i).map(str::to_owned)).collect();
+    timing.as_ref().map(name).unwrap_or_default()
+}
+
 fn metadata(scenario: &Scenario) -> BTreeMap<String, String> {
-    let cards: Vec<_> = scenario
-        .rack
-        .slaves
-        .iter()
-        .map(|slave| slave.name.as_str())
-        .collect();
-    let tasks: Vec<_> = scenario
-        .rack
-        .tasks
-        .iter()
-        .map(|task| task.name.as_str())
-        .collect();
+    let cards: Vec<_> = scenario.rack.slaves.iter().map(|slave| slave.name.as_str()).collect();
+    let tasks: Vec<_> = scenario.rack.tasks.iter().map(|task| task.name.as_str()).collect();
     BTreeMap::from([
         ("title".into(), scenario.title.clone()),
         ("seed".into(), scenario.seed.to_string()),

@@ -1,7 +1,7 @@
 //! Payloads of the rack as ROS 2 messages. Field order is that of the definitions in `schema/`.
 
 use crate::cdr::Cdr;
-use messages::{ControlProbe, Event, EventKind, JOINTS, Ns, PlantProbe, TransferRecord};
+use messages::{ControlProbe, Event, EventKind, JOINTS, MasterUse, Ns, PlantProbe, SensorPath, TransferRecord};
 
 /// Frame of all poses and wrenches: fixed in the world, z into the surface.
 pub const TASK_FRAME: &str = "task";
@@ -116,12 +116,7 @@ pub fn transfers(cdr: &mut Cdr, from: Ns, until: Ns, transfers: &[TransferRecord
     cdr.u64(until);
     cdr.u32(transfers.len() as u32);
     for transfer in transfers {
-        for time in [
-            transfer.requested,
-            transfer.granted,
-            transfer.data_at,
-            transfer.done,
-        ] {
+        for time in [transfer.requested, transfer.granted, transfer.data_at, transfer.done] {
             cdr.u64(time);
         }
         for number in [transfer.addr, transfer.n, transfer.job] {
@@ -136,13 +131,36 @@ pub fn transfers(cdr: &mut Cdr, from: Ns, until: Ns, transfers: &[TransferRecord
     }
 }
 
+/// `rack_msgs/MasterUse`.
+pub fn master_use(cdr: &mut Cdr, used: &MasterUse, name: &str) {
+    header(cdr, used.t, "");
+    cdr.string(name);
+    for number in [used.transfers, used.bus_errors, used.access_timeouts] {
+        cdr.u32(number);
+    }
+    cdr.u64(used.held_ns);
+    cdr.f64(used.held_ns as f64 / used.t.max(1) as f64);
+    cdr.u64(used.wait_max_ns);
+    cdr.u64(used.service_max_ns);
+    for count in used.wait.iter().chain(&used.service) {
+        cdr.u32(*count);
+    }
+}
+
+/// `rack_msgs/Latency`.
+pub fn latency(cdr: &mut Cdr, path: &SensorPath) {
+    header(cdr, path.t, "");
+    cdr.u32(path.job);
+    cdr.u64(path.t - path.felt);
+    for part in path.parts {
+        cdr.u64(part);
+    }
+}
+
 /// `diagnostic_msgs/DiagnosticArray` with one status.
 pub fn event(cdr: &mut Cdr, event: &Event) {
     let kind = EventKind::from_number(event.kind);
-    let name = kind.map_or_else(
-        || format!("event-{}", event.kind),
-        |kind| kind.name().to_owned(),
-    );
+    let name = kind.map_or_else(|| format!("event-{}", event.kind), |kind| kind.name().to_owned());
     let [a, b] = kind.map_or(["a", "b"], figures);
     let values = [(a, event.a), (b, event.b)];
     let values = || values.iter().filter(|(key, _)| !key.is_empty());
@@ -151,12 +169,7 @@ pub fn event(cdr: &mut Cdr, event: &Event) {
     cdr.u32(1);
     cdr.u8(event.severity as u8);
     cdr.string(&name);
-    cdr.string(
-        &values()
-            .map(|(key, value)| format!("{key} {value}"))
-            .collect::<Vec<_>>()
-            .join(", "),
-    );
+    cdr.string(&values().map(|(key, value)| format!("{key} {value}")).collect::<Vec<_>>().join(", "));
     cdr.string("");
     cdr.u32(values().count() as u32);
     for (key, value) in values() {

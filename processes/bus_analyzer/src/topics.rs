@@ -30,6 +30,10 @@ pub enum Topic {
     TfStatic,
     /// X as the control computer knows it.
     Tool,
+    /// From sensor to actuator, one message per job.
+    Latency,
+    /// Use of the bus by each master, every second.
+    Masters,
     /// Bus transfers, one message per window.
     Transfers,
     /// F_e as the control computer knows it.
@@ -39,7 +43,7 @@ pub enum Topic {
 use Topic::*;
 
 /// All channels, in order.
-pub const TOPICS: [Topic; 15] = [
+pub const TOPICS: [Topic; 17] = [
     ControlState,
     Desired,
     Events,
@@ -53,6 +57,8 @@ pub const TOPICS: [Topic; 15] = [
     Tf,
     TfStatic,
     Tool,
+    Latency,
+    Masters,
     Transfers,
     Wrench,
 ];
@@ -77,6 +83,8 @@ impl Topic {
             Tf => "/tf",
             TfStatic => "/tf_static",
             Tool => "/tool",
+            Latency => "/vme/latency",
+            Masters => "/vme/masters",
             Transfers => "/vme/transfers",
             Wrench => "/wrench",
         }
@@ -87,6 +95,8 @@ impl Topic {
         match self {
             ControlState => "rack_msgs/msg/ControlState",
             PlantState => "rack_msgs/msg/PlantState",
+            Latency => "rack_msgs/msg/Latency",
+            Masters => "rack_msgs/msg/MasterUse",
             Transfers => "rack_msgs/msg/Transfers",
             Events => "diagnostic_msgs/msg/DiagnosticArray",
             JointStates | PlantJointStates => "sensor_msgs/msg/JointState",

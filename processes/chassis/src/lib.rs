@@ -4,8 +4,13 @@
 //! * [`rack_run`]: one variant of a scenario from power-up to the last window.
 //! * [`parallel`]: independent runs on all cores.
 //! * [`boards`]: the built-in board of every role.
+//! * [`output`]: results to standard output.
 
 #![warn(missing_docs)]
+
+// first: its `print!` and `println!` are those of all modules below
+#[macro_use]
+pub mod output;
 
 pub mod boards;
 pub mod cli;

@@ -183,8 +183,11 @@ pub fn listen(scenario: &Scenario, end: Ns, observer: &mut dyn Observer) -> Resu
 struct Listener(Accounting);
 
 impl Observer for Listener {
-    fn window(&mut self, _until: Ns, _mail: &Mail, log: &Log) -> Flow {
-        self.0.window(log);
+    fn account(&mut self, until: Ns, log: &Log, record: &mut Mail) {
+        self.0.window(until, log, &mut record.masters, &mut record.paths);
+    }
+
+    fn window(&mut self, _until: Ns, _mail: &Mail, _log: &Log) -> Flow {
         Flow::Continue
     }
 }
@@ -246,12 +249,15 @@ fn safety_state(number: u32) -> &'static str {
 }
 
 impl Observer for Witness<'_> {
+    fn account(&mut self, until: Ns, log: &Log, record: &mut Mail) {
+        self.accounting.window(until, log, &mut record.masters, &mut record.paths);
+    }
+
     fn window(&mut self, until: Ns, mail: &Mail, log: &Log) -> Flow {
         self.reached = until;
         self.trace.window(&mail.plant_probe, &mail.control_probe, &mail.events);
         let programs = log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program);
         programs.for_each(|transfer| self.ledger.push(transfer));
-        self.accounting.window(log);
         self.record_lost |= mail.events.iter().any(|event| event.kind == EventKind::RecordLost as u32);
         self.diverged |= mail.plant_probe.iter().any(|probe| probe.status & drive_status::DIVERGED != 0);
         (self.progress)(until);

@@ -6,15 +6,15 @@
 
 use crate::commands::{self, Refusal};
 use crate::frame::quaternion_wxyz;
+use crate::handover::Wanted;
+use crate::output::Output;
 use crate::pipeline::{Job, Mode, Pipeline};
-use crate::program::{BusProgram, Rest};
-use crate::safety::{Safety, Signs, State};
+use crate::program::{BusProgram, Part, Rest};
+use crate::safety::{Signs, State};
+use crate::second_card::SecondCard;
 use crate::sensors::Sensors;
-use arm::JointVector;
 use board::{Board, Inputs, Outputs};
-use messages::{
-    Command, CommandKind, ControlProbe, Event, EventKind, JOINTS, Severity, Telemetry, TransferRecord, limits,
-};
+use messages::{Command, CommandKind, ControlProbe, Event, EventKind, Severity, Telemetry, TransferRecord, limits};
 use scenario::Scenario;
 use vme::Ns;
 
@@ -23,20 +23,18 @@ const ON_THE_WAY: usize = 64;
 /// Segment number before the first.
 const NO_SEGMENT: u32 = u32::MAX;
 
-/// Two processor cards: TG, AHIC, ERC, RR, inverse dynamics, safety.
+/// Two processor cards: TG, AHIC, ERC, RR, inverse dynamics, safety. One of them runs it all, or they share it.
 pub struct ControlComputer {
     task: u16,
     period_ns: Ns,
     program: BusProgram,
     sensors: Sensors,
     pipeline: Pipeline,
-    safety: Safety,
-    converters: Converters,
+    end: End,
+    /// Safety state that the last job saw.
+    state: State,
     /// Own clock at the last job.
     last: Option<Ns>,
-    /// What the last job did after its decision.
-    rest: Option<Rest>,
-    finite: bool,
     /// Commands posted whose write has not been carried out yet.
     on_the_way: Vec<Command>,
     /// Epoch of the last command judged.
@@ -50,19 +48,12 @@ pub struct ControlComputer {
     telemetry: [Telemetry; 2],
 }
 
-/// D/A converters: from torque to code.
-struct Converters {
-    nm_per_v: JointVector,
-    bits: u32,
-}
-
-impl Converters {
-    /// Offset binary over ±10 V.
-    fn code(&self, joint: usize, torque: f64) -> u32 {
-        let half = 2f64.powi(self.bits as i32 - 1);
-        let steps = (torque / self.nm_per_v[joint] / 10.0 * half).round();
-        (steps + half).clamp(0.0, 2.0 * half - 1.0) as u32
-    }
+/// Where the pipeline ends.
+enum End {
+    /// On the first card: the drives.
+    Drives(Output),
+    /// On the second one, which drives them. `told`: the hand-over is part of the job's program.
+    SecondCard { card: Box<SecondCard>, told: bool },
 }
 
 impl ControlComputer {
@@ -80,20 +71,23 @@ impl ControlComputer {
             position: [0.0; 3],
             wrench: [0.0; 6],
         };
+        let (part, end) = match scenario.second_control_task() {
+            None => (Part::Whole, End::Drives(Output::new(scenario)?)),
+            Some(second) => {
+                let card = Box::new(SecondCard::new(scenario, task, second)?);
+                (Part::Law, End::SecondCard { card, told: false })
+            }
+        };
+        let program = BusProgram::new(scenario, part)?;
         Ok(ControlComputer {
             task,
             period_ns: scenario.rack.tasks[usize::from(task)].period_ns,
-            program: BusProgram::new(scenario)?,
-            sensors: Sensors::new(scenario)?,
+            sensors: Sensors::new(scenario, program.sensors())?,
+            program,
             pipeline: Pipeline::new(scenario)?,
-            safety: Safety::new(&scenario.safety),
-            converters: Converters {
-                nm_per_v: scenario.drives()?.each(|drive| drive.amplifier_nm_per_v),
-                bits: scenario.da_io.bits.into(),
-            },
+            end,
+            state: State::Run,
             last: None,
-            rest: None,
-            finite: true,
             on_the_way: Vec::with_capacity(ON_THE_WAY),
             epoch: 0,
             hold: false,
@@ -107,6 +101,9 @@ impl ControlComputer {
 
     /// A transfer made to this board's dual-ported RAM.
     fn served(&mut self, transfer: &TransferRecord, out: &mut Outputs) {
+        if let End::SecondCard { card, .. } = &mut self.end {
+            card.served(transfer);
+        }
         let end = transfer.addr + transfer.n * transfer.access().width.bytes();
         if transfer.is_read() {
             if transfer.addr == self.program.telemetry && transfer.is_ok() {
@@ -137,7 +134,7 @@ impl ControlComputer {
             kind if kind == CommandKind::Segment as u32 => {
                 let segment = commands::segment(command)?;
                 let trajectory = self.pipeline.trajectory();
-                if self.hold || self.safety.state() > State::Degraded {
+                if self.hold || self.state > State::Degraded {
                     return Err(Refusal::State);
                 }
                 if segment.start < trajectory.last_start() {
@@ -155,10 +152,10 @@ impl ControlComputer {
         Ok(())
     }
 
-    /// One control job at its decision, at `t` of simulated time and `now` of this board's clock.
+    /// One job of the (first) control task at its decision, at `t` of simulated time and `now` of this board's clock.
     fn job(&mut self, job: u32, t: Ns, now: Ns, out: &mut Outputs) {
-        if let Some(read) = self.sensors.read(job) {
-            let address = self.program.read_address(read).into();
+        if let Some(register) = self.sensors.read(job) {
+            let address = self.program.register_address(register).into();
             let severity = Severity::Warn;
             out.mail.events.push(Event::new(t, EventKind::BusError, severity, job.into(), address));
         }
@@ -171,25 +168,35 @@ impl ControlComputer {
         };
         let since = self.last.map_or(self.period_ns, |last| now.saturating_sub(last).max(1));
         self.last = Some(now);
-        let done = self.pipeline.step(now, since as f64 * 1e-9, self.sensors.sensed(), mode);
-        self.finite = done.torque.iter().all(|torque| torque.is_finite());
-        let rest = match self.rest {
-            _ if mode == Mode::Free || !self.finite => Rest::Stop,
-            None | Some(Rest::Stop) => Rest::Start,
-            _ => Rest::Run,
+        let (dt, sensed) = (since as f64 * 1e-9, self.sensors.sensed());
+        let (done, written) = match &mut self.end {
+            End::Drives(output) => {
+                let done = self.pipeline.step(now, dt, sensed, mode);
+                let written = output.write((self.task, job), t, mode, &done.torque, &self.program, out);
+                (done, written)
+            }
+            End::SecondCard { card, told } => {
+                let cut = card.ram().read().torque_limited;
+                let done = self.pipeline.law_step(now, dt, sensed, mode, cut);
+                let (hold, acknowledge) = (self.hold, self.acknowledge);
+                let wanted = Wanted {
+                    held_jobs: self.sensors.held_jobs(),
+                    old_force_jobs: self.sensors.old_force_jobs(),
+                    same_force_jobs: self.sensors.same_force_jobs(),
+                    hold,
+                    acknowledge,
+                    ..done.wanted()
+                };
+                card.ram().post(job, wanted);
+                if !std::mem::replace(told, true) {
+                    out.rest = Some(self.program.hand_over());
+                }
+                (Job { torque: *card.torque(), ..done }, t + self.program.execution_ns(Rest::Run))
+            }
         };
-        let codes: [u32; JOINTS] = std::array::from_fn(|joint| {
-            let torque = if rest == Rest::Stop { 0.0 } else { done.torque[joint] };
-            self.converters.code(joint, torque)
-        });
-        if self.rest != Some(rest) {
-            out.rest = Some(self.program.after_decision(rest));
-            self.rest = Some(rest);
-        }
-        self.program.words(rest, self.task, job, &codes, &mut out.mail.words);
+        (self.hold, self.acknowledge) = (false, false);
         self.tell(t, &done, out);
         out.mail.control_probe.push(self.probe(t, job, state, &done));
-        let written = t + self.program.execution_ns(rest);
         self.telemetry = [
             self.telemetry[1],
             Telemetry {
@@ -205,34 +212,28 @@ impl ControlComputer {
         ];
     }
 
+    /// The safety state: decided here, or as the second card's state word says.
     fn decide_state(&mut self, t: Ns, now: Ns, out: &mut Outputs) -> State {
-        let before = self.safety.state();
-        let state = self.safety.decide(
-            now,
-            &Signs {
-                drive_status: self.sensors.status(),
-                held_jobs: self.sensors.held_jobs(),
-                old_force_jobs: self.sensors.old_force_jobs(),
-                same_force_jobs: self.sensors.same_force_jobs(),
-                speed: self.sensors.sensed().qd.amax(),
-                finite: self.finite,
-                hold: self.hold,
-                acknowledge: self.acknowledge,
-            },
-        );
-        (self.hold, self.acknowledge) = (false, false);
-        if state != before {
-            let severity = match state {
-                State::Run => Severity::Ok,
-                State::Degraded | State::Hold => Severity::Warn,
-                State::Stop | State::Off => Severity::Error,
-            };
-            let (from, to) = (f64::from(before as u32), f64::from(state as u32));
-            out.mail.events.push(Event::new(t, EventKind::SafetyState, severity, from, to));
-            if state == State::Hold {
-                self.pipeline.hold(self.sensors.sensed());
+        let state = match &mut self.end {
+            End::Drives(output) => {
+                let signs = Signs {
+                    drive_status: self.sensors.status(),
+                    held_jobs: self.sensors.held_jobs(),
+                    old_force_jobs: self.sensors.old_force_jobs(),
+                    same_force_jobs: self.sensors.same_force_jobs(),
+                    speed: self.sensors.sensed().qd.amax(),
+                    finite: true,
+                    hold: self.hold,
+                    acknowledge: self.acknowledge,
+                };
+                output.decide(t, now, &signs, out)
             }
+            End::SecondCard { card, .. } => card.ram().read().state,
+        };
+        if state != self.state && state == State::Hold {
+            self.pipeline.hold(self.sensors.sensed());
         }
+        self.state = state;
         state
     }
 
@@ -298,10 +299,17 @@ impl ControlComputer {
 impl Board for ControlComputer {
     fn step(&mut self, now: Ns, inputs: &Inputs, out: &mut Outputs) {
         if inputs.boot {
-            out.program = Some((self.task, self.program.until_decision()));
+            out.programs.push((self.task, self.program.until_decision()));
+            if let End::SecondCard { card, .. } = &self.end {
+                out.programs.push((card.task(), card.program()));
+            }
         }
-        for word in inputs.mail.words.iter().filter(|word| word.task == self.task) {
-            self.sensors.take(word);
+        for word in &inputs.mail.words {
+            match &mut self.end {
+                _ if word.task == self.task => self.sensors.take(word),
+                End::SecondCard { card, .. } if word.task == card.task() => card.take(word),
+                _ => {}
+            }
         }
         for command in &inputs.mail.commands {
             if self.on_the_way.len() == ON_THE_WAY {
@@ -313,8 +321,14 @@ impl Board for ControlComputer {
         for transfer in &inputs.transfers {
             self.served(transfer, out);
         }
-        if let Some(decision) = inputs.decision.filter(|decision| decision.task == self.task) {
-            self.job(decision.job, inputs.until, now, out);
+        if let Some(decision) = inputs.decision {
+            match &mut self.end {
+                _ if decision.task == self.task => self.job(decision.job, inputs.until, now, out),
+                End::SecondCard { card, .. } if decision.task == card.task() => {
+                    card.job(decision.job, inputs.until, now, out);
+                }
+                _ => {}
+            }
         }
     }
 }

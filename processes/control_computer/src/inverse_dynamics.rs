@@ -5,8 +5,45 @@
 //! close another loop. Torques beyond a drive's limit are cut there and reported.
 
 use crate::frame::{TaskKinematics, transposed_times};
+use crate::handover::Wanted;
+use crate::pipeline::Mode;
 use arm::drives::DriveData;
 use arm::{ArmState, DOF, JointVector, Spatial};
+use scenario::Scenario;
+
+/// Torques for what the law wants.
+#[derive(Clone, Debug)]
+pub struct InverseDynamics {
+    drives: Drives,
+    force_feed_forward: bool,
+}
+
+impl InverseDynamics {
+    /// Of this scenario's controller. The message says what is wrong with the drives.
+    pub fn new(scenario: &Scenario) -> Result<InverseDynamics, String> {
+        let controller = &scenario.controller;
+        Ok(InverseDynamics {
+            drives: Drives::new(&scenario.drives()?, controller.friction_compensation),
+            force_feed_forward: controller.force_feed_forward,
+        })
+    }
+
+    /// τ within the drives' limits, and the joints that were cut there, a bit each.
+    pub fn torque(&self, arm: &ArmState, tool: &TaskKinematics, wanted: &Wanted, mode: Mode) -> (JointVector, u32) {
+        let mut torque = match mode {
+            Mode::Free => return (JointVector::zeros(), 0),
+            Mode::Brake => motion_torque(arm, &self.drives, &wanted.qdd),
+            Mode::Law | Mode::Hold => {
+                motion_torque(arm, &self.drives, &wanted.qdd) + self.drives.friction(&wanted.target_speed)
+            }
+        };
+        if matches!(mode, Mode::Law | Mode::Hold) && self.force_feed_forward {
+            torque += contact_torque(tool, &wanted.fe);
+        }
+        let cut = self.drives.saturate(&mut torque);
+        (torque, cut)
+    }
+}
 
 /// What the controller knows of the drives.
 #[derive(Clone, Debug)]

@@ -1,5 +1,6 @@
 //! The control computer of the rack: two processor cards that run the augmented hybrid impedance control (AHIC) of Patel
-//! and Shadpey, *Control of Redundant Robot Manipulators*, chapters 5 and 6, as one job a period.
+//! and Shadpey, *Control of Redundant Robot Manipulators*, chapters 5 and 6, as one job a period on one of them, or as two
+//! tasks at rates of their own that meet in dual-ported RAM.
 //!
 //! | file | subject |
 //! |---|---|
@@ -11,7 +12,9 @@
 //! | `redundancy`, `joint_limits`, `cholesky` | RR and its additional task |
 //! | `inverse_dynamics` | torques, friction feed-forward, saturation |
 //! | `tool`, `frame` | F_e from the sensor's wrench; the task frame |
-//! | `sensors`, `program`, `board` | registers, bus program, the board |
+//! | `sensors`, `program`, `board` | registers, bus programs, the board |
+//! | `second_card`, `handover` | inverse dynamics, safety and D/A on the second card; what it is handed |
+//! | `output` | safety state and torques to the drives |
 //! | `commands`, `safety` | what is refused, what stops the arm |
 
 mod ahic;
@@ -20,13 +23,16 @@ mod cholesky;
 mod commands;
 mod erc;
 mod frame;
+mod handover;
 mod inverse_dynamics;
 mod joint_limits;
 mod law;
+mod output;
 mod pipeline;
 mod program;
 mod redundancy;
 mod safety;
+mod second_card;
 mod sensors;
 mod target;
 mod tool;
@@ -36,6 +42,7 @@ pub use ahic::Impedance;
 pub use board::ControlComputer;
 pub use commands::Refusal;
 pub use frame::Motion;
+pub use handover::Wanted;
 pub use law::Decided;
 pub use pipeline::{BRAKING, Job, Mode, Pipeline};
 pub use safety::State;

@@ -1,10 +1,12 @@
 //! The control pipeline of Figure 5.18: TG → AHIC → ERC → RR → inverse dynamics, with forward kinematics feeding X back.
 //!
-//! One [`Pipeline::step`] is one control job, apart from everything that has to do with the bus. It cannot fail; sensor
-//! values that are no numbers give torques that are none, which the safety state machine sees.
+//! One [`Pipeline::step`] is one control job, apart from everything that has to do with the bus; [`Pipeline::law_step`] is
+//! one of the first of two cards, without inverse dynamics. It cannot fail; sensor values that are no numbers give torques
+//! that are none, which the safety state machine sees.
 
-use crate::frame::TaskFrame;
-use crate::inverse_dynamics::{Drives, contact_torque, motion_torque};
+use crate::frame::{TaskFrame, TaskKinematics};
+use crate::handover::Wanted;
+use crate::inverse_dynamics::InverseDynamics;
 use crate::law::{Decided, Law};
 use crate::sensors::Sensed;
 use crate::tool::{Contact, ToolCompensation};
@@ -53,10 +55,15 @@ pub struct Job {
 pub struct Pipeline {
     arm: ArmModel,
     frame: TaskFrame,
+    outer: OuterLoop,
+    inverse: InverseDynamics,
+}
+
+/// The part that closes the loop over the force: F_e, then TG → AHIC → ERC → RR.
+#[derive(Clone, Debug)]
+struct OuterLoop {
     tool: ToolCompensation,
     law: Law,
-    drives: Drives,
-    force_feed_forward: bool,
 }
 
 impl Pipeline {
@@ -68,69 +75,87 @@ impl Pipeline {
         let tool = controller.tool.as_ref().unwrap_or(&scenario.arm.tool);
         let known = (tool.mass_kg, Vector3::from(tool.com_m));
         let tare = scenario::nanoseconds(controller.tare_ms * 1e-3);
-        Ok(Pipeline {
-            tool: ToolCompensation::new(
-                controller.tool_compensation.then_some(known),
-                controller.tool_inertia_compensation,
-                Vector3::from(scenario.arm.sensor_m),
-                &frame,
-                &arm.gravity(),
-                (tare > 0).then_some(tare),
-            ),
-            frame,
-            law: Law::new(scenario, &arm),
-            drives: Drives::new(&scenario.drives()?, controller.friction_compensation),
-            force_feed_forward: controller.force_feed_forward,
-            arm,
-        })
+        let tool = ToolCompensation::new(
+            controller.tool_compensation.then_some(known),
+            controller.tool_inertia_compensation,
+            Vector3::from(scenario.arm.sensor_m),
+            &frame,
+            &arm.gravity(),
+            (tare > 0).then_some(tare),
+        );
+        let outer = OuterLoop { tool, law: Law::new(scenario, &arm) };
+        Ok(Pipeline { frame, outer, inverse: InverseDynamics::new(scenario)?, arm })
     }
 
     /// TG, for the segments that commands bring.
     pub fn trajectory(&mut self) -> &mut Trajectory {
-        self.law.trajectory()
+        self.outer.law.trajectory()
     }
 
     /// Ends the segment in force and those that wait: X_d rests where the tool is.
     pub fn hold(&mut self, sensed: &Sensed) {
         let x = arm::forward_kinematics(&self.arm, &sensed.q);
-        self.law.hold(self.frame.pose(&x));
+        self.outer.law.hold(self.frame.pose(&x));
     }
 
     /// One job at `now`, `dt` seconds after the last one.
     pub fn step(&mut self, now: Ns, dt: f64, sensed: &Sensed, mode: Mode) -> Job {
         let arm = ArmState::new(&self.arm, &sensed.q, &sensed.qd);
         let tool = self.frame.kinematics(&arm.tip_motion());
+        let mut job = self.outer.decide(now, dt, sensed, &tool, mode);
+        (job.torque, job.torque_limited) = self.inverse.torque(&arm, &tool, &job.wanted(), mode);
+        self.outer.carry_on(&job, &tool, mode, dt);
+        job
+    }
+
+    /// One job of the first of two cards; `torque_limited` is what the second card has said last.
+    pub fn law_step(&mut self, now: Ns, dt: f64, sensed: &Sensed, mode: Mode, torque_limited: u32) -> Job {
+        let arm = ArmState::new(&self.arm, &sensed.q, &sensed.qd);
+        let tool = self.frame.kinematics(&arm.tip_motion());
+        let job = Job { torque_limited, ..self.outer.decide(now, dt, sensed, &tool, mode) };
+        self.outer.carry_on(&job, &tool, mode, dt);
+        job
+    }
+}
+
+impl OuterLoop {
+    /// What is wanted of the joints, no torques yet.
+    fn decide(&mut self, now: Ns, dt: f64, sensed: &Sensed, tool: &TaskKinematics, mode: Mode) -> Job {
         let contact = (self.tool).contact(&sensed.wrench, &tool.pose, &tool.twist, now, dt);
-        let mut job = Job {
-            x: tool.pose,
-            x_dot: tool.twist,
-            contact,
-            law: Decided::nothing(tool.pose),
-            torque: JointVector::zeros(),
-            torque_limited: 0,
+        let mut law = match mode {
+            Mode::Law => self.law.decide(now, sensed, tool, &contact.fe),
+            Mode::Hold => self.law.decide(now, sensed, tool, &Spatial::zeros()),
+            Mode::Brake | Mode::Free => Decided::nothing(tool.pose),
         };
-        match mode {
-            Mode::Law | Mode::Hold => {
-                let fe = if mode == Mode::Hold { Spatial::zeros() } else { contact.fe };
-                job.law = self.law.decide(now, sensed, &tool, &fe);
-                job.torque =
-                    motion_torque(&arm, &self.drives, &job.law.qdd) + self.drives.friction(&job.law.target_speed);
-                if self.force_feed_forward {
-                    job.torque += contact_torque(&tool, &contact.fe);
-                }
-            }
-            Mode::Brake => {
-                job.law.qdd = sensed.qd * -BRAKING;
-                job.torque = motion_torque(&arm, &self.drives, &job.law.qdd);
-            }
-            Mode::Free => {}
+        if mode == Mode::Brake {
+            law.qdd = sensed.qd * -BRAKING;
         }
-        job.torque_limited = self.drives.saturate(&mut job.torque);
+        let torque = JointVector::zeros();
+        Job { x: tool.pose, x_dot: tool.twist, contact, law, torque, torque_limited: 0 }
+    }
+
+    /// Carries Xᵗ on to the next job.
+    fn carry_on(&mut self, job: &Job, tool: &TaskKinematics, mode: Mode, dt: f64) {
         if matches!(mode, Mode::Law | Mode::Hold) {
-            (self.law).carry_on(&job.law, &tool, job.torque_limited != 0, dt);
+            (self.law).carry_on(&job.law, tool, job.torque_limited != 0, dt);
         } else {
             self.law.leave();
         }
-        job
+    }
+}
+
+impl Job {
+    /// What inverse dynamics is to make torques of.
+    pub fn wanted(&self) -> Wanted {
+        Wanted {
+            qdd: self.law.qdd,
+            target_speed: self.law.target_speed,
+            fe: self.contact.fe,
+            held_jobs: 0,
+            old_force_jobs: 0,
+            same_force_jobs: 0,
+            hold: false,
+            acknowledge: false,
+        }
     }
 }

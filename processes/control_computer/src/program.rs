@@ -1,10 +1,14 @@
-//! What the control task asks of the bus: its reads before the decision, its writes after it.
+//! What the control tasks ask of the bus: their reads before the decision, their writes after it.
 //!
 //! A job reads every encoder, the force sensor and the drives' status one after the other, decides, computes, and writes
 //! the D/A converters and the output watchdog. The first job after a stop also switches the amplifiers on and releases the
 //! brakes; a job in STO does the opposite. One list per kind of job gives both the accesses and the words written, so the
 //! two cannot differ.
+//!
+//! Where two cards share the pipeline, the first reads encoders, force sensor and the second card's state word, and writes
+//! the hand-over block; the second reads encoders and drives' status, and writes what one card alone would.
 
+use crate::handover;
 use messages::registers::{da, encoder, force, mailbox, parallel};
 use messages::{BusWord, JOINTS};
 use scenario::{ForceFilter, Scenario};
@@ -20,10 +24,21 @@ pub const COUNTER: usize = FORCES + 6;
 pub const ERRORS: usize = COUNTER + 1;
 /// Index of the drives' status.
 pub const STATUS: usize = ERRORS + 1;
-/// Reads in a job.
+/// Sensor registers in all.
 pub const READS: usize = STATUS + 1;
 /// Processor time from the decision to the first write where nothing has to be computed (STO).
 const STOP_EXECUTION_NS: u64 = 20_000;
+
+/// What of the pipeline a card runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// All of it.
+    Whole,
+    /// Trajectory, AHIC, ERC and RR: the first of two cards.
+    Law,
+    /// Inverse dynamics, safety and D/A: the second.
+    Torque,
+}
 
 /// What a job does after its decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,10 +104,12 @@ impl Rest {
     }
 }
 
-/// Addresses of every register that the control task uses, and its processor times.
+/// Addresses of every register that a control task uses, and its processor times.
 #[derive(Clone, Debug)]
 pub struct BusProgram {
-    reads: [Access; READS],
+    /// Sensor registers by number, in the order of the accesses.
+    sensors: Vec<usize>,
+    reads: Vec<Access>,
     codes: [Access; JOINTS],
     enable: Access,
     brake: Access,
@@ -103,11 +120,13 @@ pub struct BusProgram {
     pub telemetry: u32,
     /// First address of the command block.
     pub command: u32,
+    /// The hand-over block and the state word in the second card's RAM, where there is one.
+    pub second: Option<[Access; 2]>,
 }
 
 impl BusProgram {
-    /// Of this scenario's rack. The message names the card that is missing.
-    pub fn new(scenario: &Scenario) -> Result<BusProgram, String> {
+    /// Of this part of the pipeline in the scenario's rack. The message names the card that is missing.
+    pub fn new(scenario: &Scenario, part: Part) -> Result<BusProgram, String> {
         let register = |card: &str, offset: u32, width: Width, dir: Direction| {
             let slave = scenario
                 .rack
@@ -126,41 +145,70 @@ impl BusProgram {
         };
         let force_word = |offset: u32| register("force-sensor", stride * offset, word, Direction::Read);
         let status = register("parallel-io", parallel::INPUT, Width::D32, read)?;
-        let mut reads = [status; READS];
+        let mut registers = [status; READS];
         let mut codes = [status; JOINTS];
         for (joint, code) in codes.iter_mut().enumerate() {
             let card = format!("encoder-{}", joint / encoder::CHANNELS_PER_CARD + 1);
             let channel = encoder::CHANNEL * (joint % encoder::CHANNELS_PER_CARD) as u32;
             let at = COUNTS + 2 * joint;
-            reads[at] = register(&card, channel + encoder::COUNT, Width::D32, read)?;
-            reads[at + 1] = register(&card, channel + encoder::VELOCITY, Width::D32, read)?;
+            registers[at] = register(&card, channel + encoder::COUNT, Width::D32, read)?;
+            registers[at + 1] = register(&card, channel + encoder::VELOCITY, Width::D32, read)?;
             let card = format!("da-{}", joint / da::CHANNELS_PER_CARD + 1);
             let channel = (joint % da::CHANNELS_PER_CARD) as u32;
             *code = register(&card, da::code(channel), Width::D32, write)?;
         }
         for axis in 0..6 {
-            reads[FORCES + axis] = force_word(force::filter(filter) + 2 * axis as u32)?;
+            registers[FORCES + axis] = force_word(force::filter(filter) + 2 * axis as u32)?;
         }
-        reads[COUNTER] = force_word(force::counter(filter))?;
-        reads[ERRORS] = force_word(force::ERRORS)?;
+        registers[COUNTER] = force_word(force::counter(filter))?;
+        registers[ERRORS] = force_word(force::ERRORS)?;
+        let second = match scenario.second_control_task() {
+            Some(task) => {
+                let card = &scenario.rack.tasks[usize::from(task)].processor;
+                let ram = scenario.rack.slaves.iter().find(|slave| slave.card() == card && slave.adaptor.is_none());
+                let ram =
+                    &ram.ok_or_else(|| format!("processor card `{card}` has no dual-ported RAM on the bus"))?.name;
+                let block = register(ram, mailbox::HANDOVER, Width::D32, write)?;
+                let block = Access { n: handover::LONGWORDS, ..block };
+                Some([block, register(ram, mailbox::STATE, Width::D32, read)?])
+            }
+            None => None,
+        };
+        let sensors: Vec<usize> = match part {
+            Part::Whole => (0..READS).collect(),
+            Part::Law => (0..STATUS).collect(),
+            Part::Torque => (0..FORCES).chain([STATUS]).collect(),
+        };
+        let mut reads: Vec<Access> = sensors.iter().map(|&register| registers[register]).collect();
+        let controller = &scenario.controller;
+        let (mut entry_us, mut execution_us) = (controller.entry_us, controller.execution_us);
+        match (part, second) {
+            (Part::Law, Some([_, state])) => reads.push(state),
+            (Part::Torque, _) => {
+                (entry_us, execution_us) = (controller.second_card.entry_us, controller.second_card.execution_us);
+            }
+            _ => {}
+        }
         let ram = register("cpu-1-dpram", 0, Width::D32, read)?.addr;
         Ok(BusProgram {
+            sensors,
             reads,
             codes,
             enable: register("parallel-io", parallel::ENABLE, Width::D32, write)?,
             brake: register("parallel-io", parallel::BRAKE, Width::D32, write)?,
             heartbeat: register("parallel-io", parallel::WATCHDOG, Width::D32, write)?,
-            entry_ns: scenario::nanoseconds(scenario.controller.entry_us * 1e-6),
-            execution_ns: scenario::nanoseconds(scenario.controller.execution_us * 1e-6),
+            entry_ns: scenario::nanoseconds(entry_us * 1e-6),
+            execution_ns: scenario::nanoseconds(execution_us * 1e-6),
             telemetry: ram + mailbox::TELEMETRY,
             command: ram + mailbox::COMMAND,
+            second,
         })
     }
 
     /// A job up to its decision.
     pub fn until_decision(&self) -> Program {
         let mut program = vec![Op::Exec(self.entry_ns)];
-        program.extend(self.reads.map(Op::Access));
+        program.extend(self.reads.iter().copied().map(Op::Access));
         program.push(Op::Decide);
         program
     }
@@ -171,6 +219,17 @@ impl BusProgram {
         let accesses = rest.writes().iter().map(|&write| self.access(write));
         program.extend(accesses.map(Op::Access));
         program
+    }
+
+    /// A job of the first of two cards from its decision on.
+    pub fn hand_over(&self) -> Program {
+        let block = self.second.map(|[block, _]| Op::Access(block));
+        [Op::Exec(self.execution_ns)].into_iter().chain(block).collect()
+    }
+
+    /// Sensor registers that the task reads, by number, in the order of its accesses.
+    pub fn sensors(&self) -> &[usize] {
+        &self.sensors
     }
 
     /// Processor time from the decision to the first write, ns.
@@ -194,14 +253,14 @@ impl BusProgram {
                 },
                 job,
                 task,
-                index: (READS + i) as u16,
+                index: (self.reads.len() + i) as u16,
             });
         }
     }
 
-    /// Address of read `index`.
-    pub fn read_address(&self, index: usize) -> u32 {
-        self.reads[index].addr
+    /// Address of a sensor register that the task reads.
+    pub fn register_address(&self, register: usize) -> u32 {
+        self.sensors.iter().position(|&read| read == register).map_or(0, |i| self.reads[i].addr)
     }
 
     fn access(&self, write: Write) -> Access {

@@ -39,6 +39,8 @@ pub struct Sensed {
 pub struct Sensors {
     /// Words of the job under way.
     words: [BusWord; READS],
+    /// Register that each access of a job reads.
+    registers: Vec<usize>,
     /// Bit i: word i came in this job and is valid.
     came: u32,
     job: u32,
@@ -61,8 +63,8 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// Sensors of an arm at its initial posture.
-    pub fn new(scenario: &Scenario) -> Result<Sensors, String> {
+    /// Sensors of an arm at its initial posture, read by a task whose accesses go to these registers.
+    pub fn new(scenario: &Scenario, registers: &[usize]) -> Result<Sensors, String> {
         let drives = scenario.drives()?;
         let counts_per_rad = drives.each(|drive| drive.counts_per_rad());
         let posture = scenario.initial_posture()?;
@@ -75,6 +77,7 @@ impl Sensors {
             Spatial::from_fn(|axis, _| if axis < 3 { receiver.full_scale_n } else { receiver.full_scale_nm });
         Ok(Sensors {
             words: [BusWord { t: 0, addr: 0, value: 0, job: 0, task: 0, index: 0 }; READS],
+            registers: registers.to_vec(),
             came: 0,
             job: 0,
             held: [0; READS],
@@ -96,10 +99,7 @@ impl Sensors {
 
     /// Takes the answer to a read of a job; answers of another job empty the block first.
     pub fn take(&mut self, word: &BusWord) {
-        let index = usize::from(word.index);
-        if index >= READS {
-            return;
-        }
+        let Some(&index) = self.registers.get(usize::from(word.index)) else { return };
         if word.job != self.job {
             self.job = word.job;
             self.came = 0;
@@ -108,7 +108,7 @@ impl Sensors {
         self.came |= 1 << index;
     }
 
-    /// Decodes the words of `job`. Returns the first read that has just failed, if any.
+    /// Decodes the words of `job`. Returns the first register whose read has just failed, if any.
     pub fn read(&mut self, job: u32) -> Option<usize> {
         let came = if self.job == job { self.came } else { 0 };
         self.came = came;
@@ -116,7 +116,7 @@ impl Sensors {
             self.came &= !FORCE_WORDS;
         }
         let mut failed = None;
-        for index in 0..READS {
+        for &index in &self.registers {
             self.held[index] = if self.has(index) { 0 } else { self.held[index] + 1 };
             if failed.is_none() && came & (1 << index) == 0 && self.held[index] == 1 {
                 failed = Some(index);
@@ -223,6 +223,11 @@ fn count(times: &mut u32, again: bool) {
 mod tests {
     use super::*;
 
+    /// Sensors of a task that reads every register.
+    fn all(scenario: &Scenario) -> Sensors {
+        Sensors::new(scenario, &(0..READS).collect::<Vec<_>>()).unwrap()
+    }
+
     fn scenario(overrides: &[&str]) -> Scenario {
         let overrides: Vec<String> = overrides.iter().map(|o| o.to_string()).collect();
         scenario::load("table-5-3", &overrides).unwrap().scenario().unwrap()
@@ -249,7 +254,7 @@ mod tests {
     #[test]
     fn counters_are_unwrapped_both_ways_from_the_posture_that_homing_left() {
         let scenario = scenario(&[]);
-        let mut sensors = Sensors::new(&scenario).unwrap();
+        let mut sensors = all(&scenario);
         let mut counts = sensors.counts;
         // 24 bits wrap every 2²⁴ counts: go round twice forwards, then back
         for job in 0..100 {
@@ -268,7 +273,7 @@ mod tests {
     #[test]
     fn speeds_and_forces_are_scaled_and_keep_their_sign() {
         let scenario = scenario(&[]);
-        let mut sensors = Sensors::new(&scenario).unwrap();
+        let mut sensors = all(&scenario);
         let counts = sensors.counts;
         give(&mut sensors, 0, counts, 0);
         sensors.take(&word(0, COUNTS + 3, (-2048i32) as u32, 0));
@@ -283,7 +288,7 @@ mod tests {
 
     #[test]
     fn a_word_that_does_not_come_leaves_the_last_value_and_is_counted() {
-        let mut sensors = Sensors::new(&scenario(&[])).unwrap();
+        let mut sensors = all(&scenario(&[]));
         let counts = sensors.counts;
         give(&mut sensors, 0, counts.map(|c| c + 10), 0);
         assert_eq!((sensors.read(0), sensors.held_jobs()), (None, 0));
@@ -308,7 +313,7 @@ mod tests {
 
     #[test]
     fn under_a_receiver_error_or_saturation_the_force_is_held() {
-        let mut sensors = Sensors::new(&scenario(&[])).unwrap();
+        let mut sensors = all(&scenario(&[]));
         let counts = sensors.counts;
         for (job, errors, force, held) in [
             (0, 0, 100.0, 0),
@@ -330,7 +335,7 @@ mod tests {
     #[test]
     fn the_age_of_a_force_sample_follows_from_its_counter_across_its_wrap() {
         // filter 4 publishes every 32 ms; its counter wraps after 2097 s
-        let mut sensors = Sensors::new(&scenario(&["force_sensor_if.filter={ cascade = 4 }"])).unwrap();
+        let mut sensors = all(&scenario(&["force_sensor_if.filter={ cascade = 4 }"]));
         let counts = sensors.counts;
         for (job, (t, published)) in
             [(70_000_000, 64_000_000), (2_097_200_000_000, 2_097_184_000_000)].into_iter().enumerate()

@@ -87,7 +87,7 @@ impl Board for Workstation {
     fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
         if inputs.boot {
             let read = self.block(Direction::Read, mailbox::TELEMETRY, size_of::<Telemetry>());
-            out.program = Some((self.task, vec![read, Op::Decide]));
+            out.programs.push((self.task, vec![read, Op::Decide]));
         }
         if let Some(telemetry) = inputs.mail.telemetry.last() {
             self.accepted = Some(telemetry.epoch);

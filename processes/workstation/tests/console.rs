@@ -91,8 +91,8 @@ fn at_boot_the_program_reads_the_state_block_and_decides() {
     assert_eq!(size_of::<Telemetry>(), 4 * 26);
     let task = scenario.task_of("workstation").unwrap();
     assert_eq!(
-        out.program,
-        Some((task, vec![Op::Access(read), Op::Decide]))
+        out.programs,
+        [(task, vec![Op::Access(read), Op::Decide])]
     );
     assert_eq!(out.rest, None);
 }

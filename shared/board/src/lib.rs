@@ -61,8 +61,8 @@ pub struct Decision {
 pub struct Outputs {
     /// What it sends to other boards.
     pub mail: Mail,
-    /// New program of a task, from its next release on.
-    pub program: Option<(u16, Program)>,
+    /// New programs of this board's tasks, each from the task's next release on.
+    pub programs: Vec<(u16, Program)>,
     /// Rest of the job that stands at its decision point; `None` = as in the last job.
     pub rest: Option<Program>,
     /// The plant stopped here, before the end of the window.
@@ -73,7 +73,7 @@ impl Outputs {
     /// Empties everything and keeps the memory.
     pub fn clear(&mut self) {
         self.mail.clear();
-        self.program = None;
+        self.programs.clear();
         self.rest = None;
         self.early = None;
     }

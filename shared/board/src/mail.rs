@@ -23,6 +23,10 @@ pub struct Mail {
     pub events: Vec<Event>,
     /// Bus transfers.
     pub transfers: Vec<TransferRecord>,
+    /// Use of the bus by its masters.
+    pub masters: Vec<MasterUse>,
+    /// Ways from sensor to actuator.
+    pub paths: Vec<SensorPath>,
 }
 
 impl Mail {
@@ -37,5 +41,7 @@ impl Mail {
         self.control_probe.clear();
         self.events.clear();
         self.transfers.clear();
+        self.masters.clear();
+        self.paths.clear();
     }
 }

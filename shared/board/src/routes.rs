@@ -31,6 +31,8 @@ pub const ROUTES: &[Route] = &[
     Route { from: HwSim, kind: Kind::PlantProbe, to: &[BusAnalyzer, Chassis] },
     Route { from: ControlComputer, kind: Kind::ControlProbe, to: &[BusAnalyzer, Chassis] },
     Route { from: Chassis, kind: Kind::Transfers, to: &[BusAnalyzer] },
+    Route { from: Chassis, kind: Kind::Masters, to: &[BusAnalyzer] },
+    Route { from: Chassis, kind: Kind::Paths, to: &[BusAnalyzer] },
     Route { from: Chassis, kind: Kind::Events, to: &[BusAnalyzer, Chassis] },
     Route { from: DaIo, kind: Kind::Events, to: &[BusAnalyzer, Chassis] },
     Route { from: HwSim, kind: Kind::Events, to: &[BusAnalyzer, Chassis] },

@@ -79,6 +79,8 @@ payloads! {
     ControlProbe ControlProbe control_probe t;
     Events Event events t;
     Transfers TransferRecord transfers data_at;
+    Masters MasterUse masters t;
+    Paths SensorPath paths t;
 }
 
 struct TypedOutlet<T: Payload> {

@@ -44,15 +44,15 @@ pub mod flags {
     /// Grant: real time. First with `from` 0: get ready, and answer; then simulated time 0 is when CLOCK_MONOTONIC shows
     /// `from` ns, not answered.
     pub const START: u32 = 128;
-    /// Reply: the operations that follow are the rest of the job; otherwise the last rest is used again.
+    /// Reply: the operations that follow, up to the first [`super::OpRecord::of_task`], are the rest of the job; otherwise
+    /// the last rest is used again.
     pub const NEW_REST: u32 = 16;
     /// Reply: the plant stopped early, at [`Reply::early`].
     pub const EARLY: u32 = 32;
-    /// Reply: the operations that follow are a task's program (boot).
-    pub const PROGRAM: u32 = 64;
 }
 
-/// A board's answer to a grant. Operations follow as [`OpRecord`]s.
+/// A board's answer to a grant. Operations follow as [`OpRecord`]s: a new rest, then programs of tasks, each behind an
+/// [`OpRecord::of_task`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct Reply {
@@ -64,10 +64,6 @@ pub struct Reply {
     pub board: u32,
     /// Bits of [`flags`].
     pub flags: u32,
-    /// Task whose operations follow.
-    pub task: u32,
-    /// Processor time that the step took in this process, ns of wall time; never part of a simulated-time record.
-    pub wall_ns: u32,
 }
 
 /// An [`Op`] as plain old data.
@@ -80,7 +76,7 @@ pub struct OpRecord {
     pub addr: u32,
     /// Number of cycles of an access.
     pub n: u32,
-    /// 0 = Exec, 1 = read, 2 = write, 3 = Raise, 4 = Decide.
+    /// 0 = Exec, 1 = read, 2 = write, 3 = Raise, 4 = Decide, 5 = no operation: the ones that follow are of task `n`.
     pub kind: u32,
     /// Address modifier in the low byte, width (0 = D8, 1 = D16, 2 = D32) in the next.
     pub am_width: u32,
@@ -110,6 +106,18 @@ impl From<Op> for OpRecord {
 }
 
 impl OpRecord {
+    const TASK: u32 = 5;
+
+    /// The operations behind this record are the program of that task.
+    pub fn of_task(task: u16) -> OpRecord {
+        OpRecord { kind: OpRecord::TASK, n: task.into(), ..OpRecord::zeroed() }
+    }
+
+    /// The task whose program follows, where this record is no operation.
+    pub fn task(&self) -> Option<u16> {
+        (self.kind == OpRecord::TASK).then_some(self.n as u16)
+    }
+
     /// The operation; `None` where a board sent something that is none.
     pub fn op(&self) -> Option<Op> {
         let access = |dir| {
@@ -148,5 +156,7 @@ mod tests {
             assert_eq!(OpRecord::from(op).op(), Some(op));
         }
         assert_eq!(OpRecord { kind: 9, ..OpRecord::zeroed() }.op(), None);
+        let of_task = OpRecord::of_task(3);
+        assert_eq!((of_task.task(), of_task.op()), (Some(3), None));
     }
 }

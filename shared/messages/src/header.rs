@@ -24,6 +24,10 @@ pub enum Kind {
     Events = 7,
     /// [`crate::TransferRecord`]: the bus transfers of a window.
     Transfers = 8,
+    /// [`crate::MasterUse`]: use of the bus, for the record.
+    Masters = 9,
+    /// [`crate::SensorPath`]: ways from sensor to actuator, for the record.
+    Paths = 10,
 }
 
 /// Header of a message: simulated time, order, integrity. `wall_ns` is the only wall-clock value and

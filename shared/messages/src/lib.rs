@@ -4,6 +4,7 @@
 //! pointer in it, so it may lie in shared memory and a corrupted one is a wrong number, never
 //! undefined behaviour.
 
+mod account;
 mod board_id;
 mod bus;
 mod command;
@@ -16,6 +17,7 @@ pub mod registers;
 mod span;
 mod telemetry;
 
+pub use account::{BUCKETS, FIRST_BUCKET_NS, MasterUse, PARTS, SensorPath};
 pub use board_id::{BOARDS, BoardId};
 pub use bus::{BusWord, TransferRecord};
 pub use command::{Command, CommandKind, PathKind};

@@ -90,10 +90,15 @@ pub mod parallel {
     pub const ACKNOWLEDGE: u32 = 0x5A5A;
 }
 
-/// Dual-ported RAM of the control computer.
+/// Dual-ported RAM of the control computer's cards.
 pub mod mailbox {
     /// State block, read by the workstation as one block transfer.
     pub const TELEMETRY: u32 = 0x0000;
     /// Command block, written by the workstation.
     pub const COMMAND: u32 = 0x1000;
+    /// Hand-over block in the second card's RAM, where the pipeline is split over two: written by the first card.
+    pub const HANDOVER: u32 = 0x2000;
+    /// State word in the second card's RAM, read by the first: safety state in the low byte, above it a bit for each joint
+    /// whose torque was cut.
+    pub const STATE: u32 = 0x3000;
 }

@@ -34,7 +34,7 @@ impl Board for Empty {
                 mail.words.extend([BusWord::zeroed(); 8]);
                 mail.control_probe.push(ControlProbe { t: now, ..Zeroable::zeroed() });
                 if inputs.boot {
-                    out.program = Some((0, vec![Op::Exec(1000), Op::Decide]));
+                    out.programs.push((0, vec![Op::Exec(1000), Op::Decide]));
                 }
             }
             _ => {}

@@ -146,7 +146,7 @@ impl Boards {
         boards.wait_until_ready()?;
         for board in &BOARDS[1..] {
             let answer = boards.ask(&boards.grant_of(*board, 0, 0, flags::BOOT))?;
-            if let Some((task, program)) = answer.program {
+            for (task, program) in answer.programs {
                 boards.note_program(*board, task, &program)?;
                 timing.set_program(task, &program);
             }

@@ -12,6 +12,8 @@ pub(crate) fn take_before(until: Ns, inbox: &mut Mail, mail: &mut Mail) {
     take(until, &mut inbox.control_probe, &mut mail.control_probe, |probe| probe.t);
     take(until, &mut inbox.events, &mut mail.events, |event| event.t);
     take(until, &mut inbox.transfers, &mut mail.transfers, |transfer| transfer.data_at);
+    take(until, &mut inbox.masters, &mut mail.masters, |master| master.t);
+    take(until, &mut inbox.paths, &mut mail.paths, |path| path.t);
 }
 
 fn take<T: Copy>(until: Ns, inbox: &mut Vec<T>, mail: &mut Vec<T>, t: impl Fn(&T) -> Ns) {

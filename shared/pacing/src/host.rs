@@ -18,8 +18,8 @@ pub struct Answer {
     pub early: Option<Ns>,
     /// New rest of the job at its decision point.
     pub rest: Option<Vec<Op>>,
-    /// New program of a task.
-    pub program: Option<(u16, Vec<Op>)>,
+    /// New programs of tasks.
+    pub programs: Vec<(u16, Vec<Op>)>,
 }
 
 impl Answer {
@@ -141,7 +141,11 @@ impl Host {
             acts.stepped(id, grant, &self.inputs, &self.outputs, begin, end);
         }
         self.inputs.mail.clear();
-        Ok(Answer { early: self.outputs.early, rest: self.outputs.rest.take(), program: self.outputs.program.take() })
+        Ok(Answer {
+            early: self.outputs.early,
+            rest: self.outputs.rest.take(),
+            programs: std::mem::take(&mut self.outputs.programs),
+        })
     }
 
     /// Sends mail in the chassis' own name.

@@ -33,6 +33,8 @@ pub enum Flow {
 
 /// Sees every window of a run, in order.
 pub trait Observer {
+    /// What happened on the bus and the processors in a window; what the chassis itself has to say of it goes to the record.
+    fn account(&mut self, _until: Ns, _log: &Log, _record: &mut Mail) {}
     /// Probes and events of the window's boards, and what happened on the bus and the processors in it.
     fn window(&mut self, until: Ns, mail: &Mail, log: &Log) -> Flow;
 
@@ -106,7 +108,7 @@ impl Lockstep {
             if self.boards.window.is_multiple_of(1024) {
                 self.boards.watch()?;
             }
-            let flow = self.step(end)?;
+            let flow = self.step(end, observer)?;
             let until = self.timing.now();
             let mail = self.boards.host.read()?;
             let flow = match observer.window(until, mail, &self.log) {
@@ -135,7 +137,7 @@ impl Lockstep {
     }
 
     /// One window.
-    fn step(&mut self, end: Ns) -> Result<Flow, RunError> {
+    fn step(&mut self, end: Ns, observer: &mut dyn Observer) -> Result<Flow, RunError> {
         let from = self.timing.now();
         let limit = end.min(from + MAX_WINDOW);
         let mut stop = self.look_ahead(limit);
@@ -175,6 +177,7 @@ impl Lockstep {
             }
             Stop::Limit | Stop::Decision { .. } => {}
         }
+        observer.account(until, &self.log, &mut self.own_mail);
         self.record(from, until)?;
         std::mem::swap(&mut self.timing, &mut self.ahead);
         self.boards.reached = until;
@@ -245,7 +248,7 @@ impl Lockstep {
             }
             self.ahead.resume(task, &self.rest[usize::from(task)]);
         }
-        if let Some((task, program)) = answer.program {
+        for (task, program) in answer.programs {
             self.boards.note_program(board, task, &program)?;
             self.ahead.set_program(task, &program);
         }

@@ -285,7 +285,7 @@ impl Realtime {
             }
             self.plan.decided(window, task, answer.rest);
         }
-        if let Some((task, program)) = answer.program {
+        for (task, program) in answer.programs {
             self.boards.note_program(board, task, &program)?;
             self.plan.set_program(task, &program);
         }
@@ -313,6 +313,7 @@ impl Realtime {
                 let (job, task) = ((*job).into(), (*task).into());
                 Event::new(*at, EventKind::OverrunTrip, Severity::Error, job, task)
             }));
+            observer.account(until, &log, &mut self.own_mail);
             self.boards.host.send(&self.own_mail)?;
             self.boards.transfers[BoardId::BusAnalyzer as usize].clear();
             let grant = Grant { window, ..self.boards.grant_of(BoardId::BusAnalyzer, from, until, 0) };

@@ -6,7 +6,7 @@ use crate::host::Answer;
 use board::BoardId;
 use channels::{ChannelError, Domain, Port, Sender};
 use messages::{Grant, Header, OpRecord, Reply, Span, TransferRecord, flags};
-use vme::{Ns, Op};
+use vme::Ns;
 
 /// Grants that may be under way: the recorder's credit and some.
 const BUFFER: usize = 80;
@@ -75,30 +75,40 @@ impl Remote {
     pub fn reply(&self, now: Ns) -> Result<Option<(BoardId, u64, Answer)>, RunError> {
         let mut taken = None;
         self.replies.receive(|reply, ops| {
-            let mut count = 0;
-            let ops: Option<Vec<Op>> = ops.inspect(|_| count += 1).take(MAX_OPS).map(OpRecord::op).collect();
-            taken = Some((*reply, ops.filter(|_| count <= MAX_OPS)));
+            taken = Some((*reply, read(reply, ops)));
         })?;
-        let Some((reply, ops)) = taken else { return Ok(None) };
+        let Some((reply, answer)) = taken else { return Ok(None) };
         let bad = |what: &str| RunError::BadAnswer {
             board: BoardId::from_number(reply.board as u8).map_or("unknown", BoardId::name),
             what: format!("process `{}` sent {what}", self.process),
             when: at(now),
         };
         let board = BoardId::from_number(reply.board as u8).ok_or_else(|| bad("a board number that does not exist"))?;
-        let ops =
-            ops.ok_or_else(|| bad("a bus program with an operation that does not exist, or a far too long one"))?;
-        let mut answer = Answer::default();
-        if reply.flags & flags::EARLY != 0 {
-            answer.early = Some(reply.early);
-        }
-        if reply.flags & flags::PROGRAM != 0 {
-            answer.program = Some((reply.task as u16, ops));
-        } else if reply.flags & flags::NEW_REST != 0 {
-            answer.rest = Some(ops);
-        }
+        let answer =
+            answer.ok_or_else(|| bad("a bus program with an operation that does not exist, or a far too long one"))?;
         Ok(Some((board, reply.window, answer)))
     }
+}
+
+/// The answer in a reply; `None` where its operations make no sense.
+fn read<'a>(reply: &Reply, records: impl Iterator<Item = &'a OpRecord>) -> Option<Answer> {
+    let mut answer = Answer::default();
+    if reply.flags & flags::EARLY != 0 {
+        answer.early = Some(reply.early);
+    }
+    if reply.flags & flags::NEW_REST != 0 {
+        answer.rest = Some(Vec::new());
+    }
+    for (i, record) in records.enumerate() {
+        if i == MAX_OPS {
+            return None;
+        }
+        match record.task() {
+            Some(task) => answer.programs.push((task, Vec::new())),
+            None => answer.programs.last_mut().map(|(_, ops)| ops).or(answer.rest.as_mut())?.push(record.op()?),
+        }
+    }
+    Some(answer)
 }
 
 /// The process' end.
@@ -149,19 +159,19 @@ impl Line {
     }
 
     pub fn reply(&mut self, board: BoardId, window: u64, answer: &Answer) -> Result<(), ChannelError> {
-        let mut reply = Reply { window, early: 0, board: board as u32, flags: 0, task: 0, wall_ns: 0 };
+        let mut reply = Reply { window, early: 0, board: board as u32, flags: 0 };
         self.ops.clear();
         if let Some(early) = answer.early {
             reply.early = early;
             reply.flags |= flags::EARLY;
         }
-        if let Some((task, program)) = &answer.program {
-            reply.task = u32::from(*task);
-            reply.flags |= flags::PROGRAM;
-            self.ops.extend(program.iter().map(|op| OpRecord::from(*op)));
-        } else if let Some(rest) = &answer.rest {
+        if let Some(rest) = &answer.rest {
             reply.flags |= flags::NEW_REST;
             self.ops.extend(rest.iter().map(|op| OpRecord::from(*op)));
+        }
+        for (task, program) in &answer.programs {
+            self.ops.push(OpRecord::of_task(*task));
+            self.ops.extend(program.iter().map(|op| OpRecord::from(*op)));
         }
         self.replies.send(&reply, &self.ops)
     }

@@ -18,7 +18,7 @@ struct Listener {
 impl Board for Listener {
     fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
         if inputs.boot && self.role == BoardId::ControlComputer {
-            out.program = Some((0, vec![Op::Exec(10_000), Op::Decide]));
+            out.programs.push((0, vec![Op::Exec(10_000), Op::Decide]));
         }
         if !inputs.boot && !inputs.finish {
             let job = inputs.decision.map(|decision| decision.job);

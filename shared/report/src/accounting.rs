@@ -1,11 +1,12 @@
 //! What a run made of the bus and the processors: use by each master, ages of the sensors' values at the decision, and
 //! where the time from what the force sensor felt to the D/A's change went.
 //!
-//! All times are simulated. [`Accounting`] hears what happened window by window and closes into a [`BusAccount`]. A job
-//! whose read or write failed has no way from sensor to actuator and is left out of it.
+//! All times are simulated. [`Accounting`] hears what happened window by window, tells the record, and closes into a
+//! [`BusAccount`]. A job whose read or write failed has no way from sensor to actuator and is left out of it.
 
 use crate::ledger::PathLatency;
 use hdrhistogram::Histogram;
+use messages::{BUCKETS, MasterUse, SensorPath};
 use scenario::{ForceFilter, Scenario};
 use serde::Serialize;
 use vme::accounting::{self, Part, Waterfall};
@@ -17,8 +18,13 @@ const SAMPLE_NS: Ns = 125 * vme::MICROSECOND;
 /// The last D/A card written in a job: the arm has its torques then.
 const LAST_ACTUATOR: &str = "da-2";
 const FORCE_SENSOR: &str = "force-sensor";
+/// Parts of the way, in their order.
+const PARTS: [Part; messages::PARTS] =
+    [Part::Filter, Part::Card, Part::Arbitration, Part::Transfer, Part::WaitForTask, Part::Execution, Part::Write];
 /// Histograms count in powers of two from here.
-const FIRST_BUCKET_NS: u64 = 128;
+const FIRST_BUCKET_NS: u64 = messages::FIRST_BUCKET_NS;
+/// The record hears of the masters' use of the bus this often, and at the end.
+const TELL_NS: Ns = vme::SECOND;
 
 /// Use of the bus by one master.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -119,6 +125,10 @@ pub struct BusAccount {
     pub bus_errors: u32,
     /// Requests given up by the access timer.
     pub access_timeouts: u32,
+    /// Of these because an adaptor's link failed its parity check.
+    pub parity_errors: u32,
+    /// Adaptors whose link is down at the end.
+    pub links_down: Vec<String>,
     /// Posted writes whose failure arrived late.
     pub posted_errors: u32,
     /// Interrupts taken up by a processor.
@@ -134,15 +144,20 @@ pub struct BusAccount {
 pub struct Accounting {
     ledger: accounting::Ledger,
     tasks: Vec<TaskUse>,
-    control: Option<u16>,
+    /// Tasks of the control computer, in the order of the pipeline, and their jobs under way.
+    control: Vec<(u16, ControlJob)>,
+    /// The way so far of a value that the first of two cards has handed over.
+    handed_over: Option<Waterfall>,
     cards: Vec<String>,
     filter: Filter,
-    /// Job of the control task under way.
-    job: ControlJob,
     /// Ages by card, then the force sensor's since publication and since it was felt.
     ages: Vec<Histogram<u64>>,
     waterfall: WaterfallAccount,
     polls: u64,
+    /// When the record hears of the masters next, and the end of the run.
+    tell: (Ns, Ns),
+    /// Ways that have ended in this window.
+    paths: Vec<SensorPath>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -159,7 +174,8 @@ struct ControlJob {
     number: u32,
     reads: Vec<(u16, Ns)>,
     force: Option<Transfer>,
-    actuator: Option<Transfer>,
+    /// What the job led to: the last actuator's write, or the hand-over to the second card.
+    result: Option<Transfer>,
 }
 
 /// When the force sensor's values come out, and how late they are then.
@@ -193,35 +209,33 @@ impl Accounting {
     pub fn new(scenario: &Scenario) -> Result<Accounting, RackError> {
         let timing = Timing::new(scenario.rack.clone())?;
         let cards: Vec<String> = scenario.rack.slaves.iter().map(|slave| slave.name.clone()).collect();
-        let parts = [
-            Part::Filter,
-            Part::Card,
-            Part::Arbitration,
-            Part::Transfer,
-            Part::WaitForTask,
-            Part::Execution,
-            Part::Write,
-        ];
         Ok(Accounting {
             ledger: accounting::Ledger::new(timing.masters()),
             tasks: vec![TaskUse::default(); scenario.rack.tasks.len()],
-            control: scenario.task_of("control_computer"),
+            control: [scenario.task_of("control_computer"), scenario.second_control_task()]
+                .into_iter()
+                .flatten()
+                .map(|task| (task, ControlJob { reads: Vec::with_capacity(64), ..ControlJob::default() }))
+                .collect(),
+            handed_over: None,
             ages: (0..cards.len() + 2).map(|_| crate::ledger::histogram()).collect(),
             cards,
             filter: Filter::of(scenario),
-            job: ControlJob { reads: Vec::with_capacity(64), ..ControlJob::default() },
             waterfall: WaterfallAccount {
                 jobs: 0,
-                parts: parts.map(|part| PartAccount { part, sum_ns: 0, in_longest_ns: 0 }).to_vec(),
+                parts: PARTS.map(|part| PartAccount { part, sum_ns: 0, in_longest_ns: 0 }).to_vec(),
                 whole_sum_ns: 0,
                 whole_max_ns: 0,
             },
             polls: 0,
+            tell: (TELL_NS, scenario.duration_ns()),
+            paths: Vec::with_capacity(16),
         })
     }
 
-    /// Adds a window.
-    pub fn window(&mut self, log: &Log) {
+    /// Adds the window that ends at `until`; `masters` and `paths` get what the record is to say of it.
+    pub fn window(&mut self, until: Ns, log: &Log, masters: &mut Vec<MasterUse>, paths: &mut Vec<SensorPath>) {
+        self.paths.clear();
         let mut jobs = log.jobs.iter().peekable();
         for transfer in &log.transfers {
             // a window can hold the end of one job and the reads of the next
@@ -231,6 +245,11 @@ impl Accounting {
             self.transfer(transfer);
         }
         jobs.for_each(|job| self.job(job));
+        paths.extend_from_slice(&self.paths);
+        if until >= self.tell.0.min(self.tell.1) {
+            self.tell.0 = (until / TELL_NS + 1) * TELL_NS;
+            masters.extend((0..).zip(&self.ledger.masters).map(|(i, used)| master_use(until, i, used)));
+        }
     }
 
     fn transfer(&mut self, transfer: &Transfer) {
@@ -244,22 +263,24 @@ impl Accounting {
             task.held_ns += transfer.held_ns;
             task.access_max_ns = task.access_max_ns.max(transfer.done - transfer.requested);
         }
-        let Some(slave) = transfer.slave.filter(|_| Some(transfer.task) == self.control) else { return };
-        if transfer.job != self.job.number {
-            self.job.reads.clear();
-            (self.job.number, self.job.force, self.job.actuator) = (transfer.job, None, None);
+        let last = self.control.last().map(|(task, _)| *task);
+        let control = self.control.iter_mut().find(|(task, _)| *task == transfer.task);
+        let (Some(slave), Some((task, job))) = (transfer.slave, control) else { return };
+        if transfer.job != job.number {
+            job.reads.clear();
+            (job.number, job.force, job.result) = (transfer.job, None, None);
         }
         if transfer.status != Status::Ok {
             return;
         }
         let card = self.cards[usize::from(slave)].as_str();
         if transfer.access.dir == Direction::Read {
-            self.job.reads.push((slave, transfer.data_at));
+            job.reads.push((slave, transfer.data_at));
             if card == FORCE_SENSOR {
-                self.job.force.get_or_insert(*transfer);
+                job.force.get_or_insert(*transfer);
             }
-        } else if card == LAST_ACTUATOR {
-            self.job.actuator = Some(*transfer);
+        } else if card == LAST_ACTUATOR || Some(*task) != last {
+            job.result = Some(*transfer);
         }
     }
 
@@ -268,26 +289,41 @@ impl Accounting {
             task.jobs += 1;
             task.response_max_ns = task.response_max_ns.max(record.end - record.release);
         }
-        if Some(record.task) != self.control || record.job != self.job.number {
-            return;
-        }
+        let control = self.control.iter_mut().find(|(task, _)| *task == record.task);
+        let Some((_, job)) = control.filter(|(_, job)| job.number == record.job) else { return };
         let Some(decide) = record.decide else { return };
-        for &(slave, data_at) in &self.job.reads {
+        for &(slave, data_at) in &job.reads {
             // in real time a reading may have been told for a later instant than the decision then had
             let Some(age) = decide.checked_sub(data_at) else { continue };
             self.ages[usize::from(slave)].saturating_record(age);
         }
-        let Some(read) = self.job.force.take() else { return };
-        let Some((felt, published)) = self.filter.stamps(read.data_at).filter(|(_, published)| *published <= decide) else {
-            return;
+        let (force, result) = (job.force.take(), job.result.take());
+        let so_far = match force {
+            None => self.handed_over.take_if(|way| way.reached() <= decide),
+            Some(read) => {
+                let stamps = self.filter.stamps(read.data_at).filter(|(_, published)| *published <= decide);
+                let Some((felt, published)) = stamps else { return };
+                let [.., since_published, since_felt] = self.ages.as_mut_slice() else { return };
+                since_published.saturating_record(decide - published);
+                since_felt.saturating_record(decide - felt);
+                // a value published between the request and the data has waited on the card for less than nothing
+                Waterfall::begin(felt, published.min(read.requested), &read).ok()
+            }
         };
-        let [.., since_published, since_felt] = self.ages.as_mut_slice() else { return };
-        since_published.saturating_record(decide - published);
-        since_felt.saturating_record(decide - felt);
-        let Some(write) = self.job.actuator.take() else { return };
-        // a value published between the request and the data has waited on the card for less than nothing
-        if let Ok(waterfall) = Waterfall::new(felt, published.min(read.requested), &read, record, &write) {
-            self.waterfall.add(&waterfall);
+        let (Some(so_far), Some(result)) = (so_far, result) else { return };
+        if self.control.last().is_some_and(|(last, _)| *last == record.task) {
+            if let Ok(whole) = so_far.write(record, &result) {
+                self.waterfall.add(&whole);
+                self.paths.push(SensorPath {
+                    t: whole.reached(),
+                    felt: whole.reached() - whole.whole(),
+                    parts: PARTS.map(|part| whole.time(part)),
+                    job: record.job,
+                    reserved: 0,
+                });
+            }
+        } else {
+            self.handed_over = so_far.hand_over(record, &result).ok();
         }
     }
 
@@ -338,6 +374,12 @@ impl Accounting {
             waterfall: self.waterfall.clone(),
             bus_errors: counters.bus_errors,
             access_timeouts: counters.access_timeouts,
+            parity_errors: counters.parity_errors,
+            links_down: (0..)
+                .zip(&timing.rack().adaptors)
+                .filter(|(i, _)| !timing.link_up(*i))
+                .map(|(_, adaptor)| adaptor.name.clone())
+                .collect(),
             posted_errors: counters.posted_errors,
             interrupts: counters.interrupts,
             merged_interrupts: counters.merged_interrupts,
@@ -371,6 +413,30 @@ impl BusAccount {
     /// Releases that the tasks of the control computer and the others lost.
     pub fn lost_releases(&self) -> u64 {
         self.tasks.iter().map(|task| u64::from(task.lost_releases)).sum()
+    }
+}
+
+/// Use of the bus by one master, as the record says it.
+fn master_use(t: Ns, master: u32, used: &accounting::MasterUse) -> MasterUse {
+    let buckets = |histogram: &Histogram<u64>| {
+        let mut counts = [0; BUCKETS];
+        for bucket in histogram.iter_log(FIRST_BUCKET_NS, 2.0) {
+            let upper = bucket.value_iterated_to().div_ceil(FIRST_BUCKET_NS).next_power_of_two();
+            counts[(upper.ilog2() as usize).min(BUCKETS - 1)] += bucket.count_since_last_iteration() as u32;
+        }
+        counts
+    };
+    MasterUse {
+        t,
+        held_ns: used.held_ns,
+        wait_max_ns: used.wait.max(),
+        service_max_ns: used.service.max(),
+        master,
+        transfers: used.transfers as u32,
+        bus_errors: used.bus_errors as u32,
+        access_timeouts: used.access_timeouts as u32,
+        wait: buckets(&used.wait),
+        service: buckets(&used.service),
     }
 }
 
@@ -415,7 +481,7 @@ mod tests {
             if let Stop::Decision { task, .. } = stop {
                 timing.resume(task, &rest);
             }
-            accounting.window(&log);
+            accounting.window(timing.now(), &log, &mut Vec::new(), &mut Vec::new());
         }
         accounting.close(&timing, &[[program.to_vec(), rest.to_vec()].concat(), Vec::new()])
     }
@@ -429,6 +495,59 @@ mod tests {
         assert_eq!(way.parts.iter().map(|part| part.in_longest_ns).sum::<Ns>(), way.whole_max_ns);
         let execution = way.parts.iter().find(|part| part.part == Part::Execution).unwrap();
         assert_eq!(execution.sum_ns, 200 * 1_500_000);
+    }
+
+    #[test]
+    fn over_two_cards_the_parts_add_up_too_and_hold_both_cards_execution() {
+        let mut scenario = scenario::load("table-5-3", &[]).unwrap().scenario().unwrap();
+        let mut second = scenario.rack.tasks[0].clone();
+        (second.name, second.processor, second.period_ns) = ("torque".into(), "cpu-2".into(), vme::MILLISECOND);
+        scenario.rack.tasks.push(second);
+        let access = |card: &str, dir, n| {
+            let addr = scenario.card_base(card).unwrap();
+            Op::Access(Access { am: 0x3D, addr, width: Width::D32, dir, n })
+        };
+        let [read, block] =
+            [("force-sensor", Direction::Read, 1), ("cpu-2-dpram", Direction::Write, 43)].map(|(card, dir, n)| {
+                match access(card, dir, n) {
+                    Op::Access(access) if card == FORCE_SENSOR => Op::Access(Access { width: Width::D16, ..access }),
+                    op => op,
+                }
+            });
+        let (count, write) = (access("encoder-1", Direction::Read, 1), access(LAST_ACTUATOR, Direction::Write, 1));
+        let mut accounting = Accounting::new(&scenario).unwrap();
+        let mut timing = Timing::new(scenario.rack.clone()).unwrap();
+        timing.set_program(0, &[Op::Exec(130_000), read, Op::Decide]);
+        timing.set_program(2, &[Op::Exec(20_000), count, Op::Decide]);
+        let (mut masters, mut paths) = (Vec::new(), Vec::new());
+        let rests = [vec![Op::Exec(1_500_000), block], vec![], vec![Op::Exec(300_000), write]];
+        while timing.now() < vme::SECOND {
+            let mut log = Log::default();
+            if let Stop::Decision { task, .. } = timing.advance(vme::SECOND, &mut log) {
+                timing.resume(task, &rests[usize::from(task)]);
+            }
+            accounting.window(timing.now(), &log, &mut masters, &mut paths);
+        }
+        let account = accounting.close(&timing, &[vec![], vec![], vec![]]);
+        let way = &account.waterfall;
+        assert_eq!(way.jobs, 200);
+        // the record hears the same
+        assert_eq!(paths.len(), 200);
+        assert!(paths.iter().all(|path| path.parts.iter().sum::<Ns>() == path.t - path.felt));
+        assert_eq!(paths.iter().map(|path| path.t - path.felt).sum::<Ns>(), way.whole_sum_ns);
+        assert_eq!(masters.len(), account.masters.len());
+        for (told, master) in masters.iter().zip(&account.masters) {
+            assert_eq!(u64::from(told.transfers), master.transfers);
+            assert_eq!(told.wait.iter().sum::<u32>(), told.transfers);
+            assert_eq!(told.held_ns as f64 / 1e9, master.utilisation);
+            // arbitration alone takes 300 ns and 30 a slot: above 256, up to 512
+            let processor = master.name.starts_with("cpu");
+            assert!(!processor || told.transfers == 0 || told.wait[2] > 0, "{told:?}");
+        }
+        assert_eq!(way.parts.iter().map(|part| part.sum_ns).sum::<Ns>(), way.whole_sum_ns);
+        assert_eq!(way.parts.iter().map(|part| part.in_longest_ns).sum::<Ns>(), way.whole_max_ns);
+        let execution = way.parts.iter().find(|part| part.part == Part::Execution).unwrap();
+        assert_eq!(execution.sum_ns, 200 * 1_800_000);
     }
 
     #[test]

@@ -23,17 +23,19 @@ pub(crate) const WATERFALL_HEADINGS: [&str; 3] = ["sensor to actuator", "mean µ
 
 /// One line of what is counted once.
 pub(crate) fn counts(bus: &BusAccount) -> String {
+    let links: String = bus.links_down.iter().map(|adaptor| format!("; link of {adaptor} down")).collect();
     format!(
-        "bus kept for {:.3} % of {:.3} s; {} BERR*, {} access timer, {} late errors of posted writes, {} interrupts ({} merged), {} polls",
+        "bus kept for {:.3} % of {:.3} s; {} BERR* ({} of them parity), {} access timer, {} late errors of posted writes, {} interrupts ({} merged), {} polls",
         100.0 * bus.utilisation,
         bus.elapsed_ns as f64 * 1e-9,
         bus.bus_errors,
+        bus.parity_errors,
         bus.access_timeouts,
         bus.posted_errors,
         bus.interrupts,
         bus.merged_interrupts,
         bus.polls
-    )
+    ) + &links
 }
 
 /// One row per master that used the bus.

@@ -99,7 +99,9 @@ fn controller(controller: &Controller) -> Result {
     not_negative("controller.joint_limit.max_weight", controller.joint_limit.max_weight)?;
     not_negative("controller.tare_ms", controller.tare_ms)?;
     not_negative("controller.execution_us", controller.execution_us)?;
-    not_negative("controller.entry_us", controller.entry_us)
+    not_negative("controller.entry_us", controller.entry_us)?;
+    not_negative("controller.second_card.execution_us", controller.second_card.execution_us)?;
+    not_negative("controller.second_card.entry_us", controller.second_card.entry_us)
 }
 
 fn segments(scenario: &Scenario) -> Result {
@@ -198,6 +200,17 @@ fn rack(scenario: &Scenario) -> Result {
     for board in ["control_computer", "workstation"] {
         if scenario.task_of(board).is_none() {
             return Err(Problem::new("rack.tasks", format!("no task for `{board}`")));
+        }
+    }
+    let mut control = rack.tasks.iter().enumerate().filter(|(_, task)| task.board == "control_computer");
+    if let (Some((_, first)), Some((i, second))) = (control.next(), control.next()) {
+        if first.processor == second.processor {
+            let (first, second, card) = (&first.name, &second.name, &first.processor);
+            return Err(Problem::new(format!("rack.tasks.{i}.processor"), format!("tasks `{first}` and `{second}` share the pipeline and both run on `{card}`, expected another card for `{second}`")));
+        }
+        if let Some((j, third)) = control.next() {
+            let (first, second, third) = (&first.name, &second.name, &third.name);
+            return Err(Problem::new(format!("rack.tasks.{j}"), format!("tasks `{first}` and `{second}` share the pipeline already; there is nothing left for `{third}`")));
         }
     }
     for (i, slave) in rack.slaves.iter().enumerate() {

@@ -103,6 +103,12 @@ impl Scenario {
         crate::overrides::get(&tree, key).cloned()
     }
 
+    /// Task of the second processor card, where two share the pipeline: inverse dynamics, safety and D/A.
+    pub fn second_control_task(&self) -> Option<u16> {
+        let mut tasks = (0..).zip(&self.rack.tasks).filter(|(_, task)| task.board == "control_computer");
+        tasks.nth(1).map(|(i, _)| i)
+    }
+
     /// Index of the board's first task.
     pub fn task_of(&self, board: &str) -> Option<u16> {
         self.rack.tasks.iter().position(|task| task.board == board).map(|i| i as u16)

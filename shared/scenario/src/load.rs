@@ -159,15 +159,25 @@ fn widen_receiver(scenario: &mut Scenario) {
     }
 }
 
-/// The processor card's times, where the text states none of its own.
+/// The processor cards' times, where the text states none of its own.
 fn preset_times(scenario: &mut Scenario, tree: &Table) {
-    let Some(times) = scenario.controller.processor.map(|processor| processor.times()) else { return };
-    let stated = |key: &str| tree.get("controller").is_some_and(|controller| controller.get(key).is_some());
-    if !stated("execution_us") {
-        scenario.controller.execution_us = times.pipeline_ns() as f64 * 1e-3;
+    let split = scenario.second_control_task().is_some();
+    let controller = &mut scenario.controller;
+    let table = tree.get("controller").and_then(Value::as_table);
+    let set = |table: Option<&Table>, key: &str, time: &mut f64, ns: vme::Ns| {
+        if !table.is_some_and(|table| table.contains_key(key)) {
+            *time = ns as f64 * 1e-3;
+        }
+    };
+    if let Some(times) = controller.processor.map(|processor| processor.times()) {
+        let execution = if split { times.law_ns() } else { times.pipeline_ns() };
+        set(table, "execution_us", &mut controller.execution_us, execution);
+        set(table, "entry_us", &mut controller.entry_us, times.entry_ns());
     }
-    if !stated("entry_us") {
-        scenario.controller.entry_us = (times.switch_ns + times.interrupt_ns) as f64 * 1e-3;
+    if let Some(times) = controller.second_card.processor.or(controller.processor).map(|processor| processor.times()) {
+        let table = table.and_then(|table| table.get("second_card")).and_then(Value::as_table);
+        set(table, "execution_us", &mut controller.second_card.execution_us, times.torque_ns());
+        set(table, "entry_us", &mut controller.second_card.entry_us, times.entry_ns());
     }
 }
 

@@ -11,7 +11,7 @@ mod plant;
 mod safety;
 mod segment;
 
-pub use controller::{Controller, JointLimitTask, Scheme};
+pub use controller::{Controller, JointLimitTask, Scheme, SecondCard};
 pub use fault::{Fault, FaultKind};
 pub use hole::Hole;
 pub use interfaces::{DaIo, EncoderIf, ForceSensorIf, ForceFilter, VelocitySource};

@@ -11,26 +11,11 @@ use vme::{Access, Direction, Ns, Op, Stop, Timing, Transfer, Width};
 const PERIOD: Ns = 5_000_000;
 
 fn main() {
-    for (mode, load) in [
-        (Mode::Pri, [0.1, 0.3, 0.3, 0.2]),
-        (Mode::Rrs, [0.2; 4]),
-        (Mode::Sgl, [0.2; 4]),
-    ] {
+    for (mode, load) in [(Mode::Pri, [0.1, 0.3, 0.3, 0.2]), (Mode::Rrs, [0.2; 4]), (Mode::Sgl, [0.2; 4])] {
         let transfers = 10_000_000;
-        let offered = Offered {
-            mode,
-            service_ns: 1_000,
-            load,
-            arrivals: Arrivals::Poisson,
-            transfers,
-            seed: 1,
-        };
+        let offered = Offered { mode, service_ns: 1_000, load, arrivals: Arrivals::Poisson, transfers, seed: 1 };
         let start = Instant::now();
-        black_box(
-            simulate(&offered)
-                .map(|observed| observed.simulated_ns)
-                .unwrap_or_default(),
-        );
+        black_box(simulate(&offered).map(|observed| observed.simulated_ns).unwrap_or_default());
         let rate = transfers as f64 / start.elapsed().as_secs_f64();
         println!("arbiter {mode:?}: {:.1} M transfers/s", rate / 1e6);
     }
@@ -39,15 +24,7 @@ fn main() {
 
 /// The nominal control window: 17 reads, a decision, 8 writes; a copy run ahead, as the chassis does.
 fn nominal_window() {
-    let access = |addr, dir| {
-        Op::Access(Access {
-            am: 0x3D,
-            addr,
-            width: Width::D16,
-            dir,
-            n: 1,
-        })
-    };
+    let access = |addr, dir| Op::Access(Access { am: 0x3D, addr, width: Width::D16, dir, n: 1 });
     let mut reads = vec![Op::Exec(20_000)];
     reads.extend((0..17).map(|i| access(0x10_0000 + 2 * i, Direction::Read)));
     reads.push(Op::Decide);
@@ -70,19 +47,11 @@ fn nominal_window() {
         .map(|name| Task {
             name: (*name).into(),
             processor: format!("cpu-{name}"),
-            period_ns: if *name == "control" {
-                PERIOD
-            } else {
-                20 * PERIOD
-            },
+            period_ns: if *name == "control" { PERIOD } else { 20 * PERIOD },
             ..Task::default()
         })
         .collect();
-    let rack = Rack {
-        slaves,
-        tasks,
-        ..Rack::default()
-    };
+    let rack = Rack { slaves, tasks, ..Rack::default() };
     let mut timing = match Timing::new(rack) {
         Ok(timing) => timing,
         Err(error) => return println!("nominal rack: {error}"),
@@ -102,9 +71,5 @@ fn nominal_window() {
         moved += transfers.len();
     }
     let each = start.elapsed().as_secs_f64() / windows as f64;
-    println!(
-        "nominal window: {:.2} µs with its copy, {:.1} transfers",
-        each * 1e6,
-        moved as f64 / windows as f64
-    );
+    println!("nominal window: {:.2} µs with its copy, {:.1} transfers", each * 1e6, moved as f64 / windows as f64);
 }

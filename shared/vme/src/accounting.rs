@@ -33,10 +33,8 @@ pub struct MasterUse {
 
 impl MasterUse {
     fn new() -> MasterUse {
-        let histogram = || {
-            Histogram::new_with_max(LONGEST, 3)
-                .unwrap_or_else(|error| unreachable!("constant bounds: {error}"))
-        };
+        let histogram =
+            || Histogram::new_with_max(LONGEST, 3).unwrap_or_else(|error| unreachable!("constant bounds: {error}"));
         MasterUse {
             transfers: 0,
             bus_errors: 0,
@@ -49,11 +47,7 @@ impl MasterUse {
 
     /// Part of `elapsed_ns` for which it kept the bus.
     pub fn utilisation(&self, elapsed_ns: Ns) -> f64 {
-        if elapsed_ns == 0 {
-            0.0
-        } else {
-            self.held_ns as f64 / elapsed_ns as f64
-        }
+        if elapsed_ns == 0 { 0.0 } else { self.held_ns as f64 / elapsed_ns as f64 }
     }
 }
 
@@ -67,9 +61,7 @@ pub struct Ledger {
 impl Ledger {
     /// An empty ledger of this many masters.
     pub fn new(masters: usize) -> Ledger {
-        Ledger {
-            masters: (0..masters).map(|_| MasterUse::new()).collect(),
-        }
+        Ledger { masters: (0..masters).map(|_| MasterUse::new()).collect() }
     }
 }
 
@@ -89,12 +81,8 @@ impl Sink for Ledger {
                 return;
             }
         }
-        master
-            .wait
-            .saturating_record(transfer.granted - transfer.requested);
-        master
-            .service
-            .saturating_record(transfer.done - transfer.granted);
+        master.wait.saturating_record(transfer.granted - transfer.requested);
+        master.service.saturating_record(transfer.done - transfer.granted);
     }
 }
 
@@ -139,48 +127,60 @@ pub struct OutOfOrder {
 
 impl Waterfall {
     /// From a value felt at `felt` and published by the card at `published`, through the transfer
-    /// that read it and the job that used it, to the write that it led to.
-    ///
-    /// Between the read's data and the write's request the job either executes or waits; its
-    /// execution is counted last, at most as much as fits.
-    pub fn new(
-        felt: Ns,
-        published: Ns,
-        read: &Transfer,
-        job: &JobRecord,
-        write: &Transfer,
-    ) -> Result<Waterfall, OutOfOrder> {
-        let between = write.requested.saturating_sub(read.data_at);
+    /// that read it.
+    pub fn begin(felt: Ns, published: Ns, read: &Transfer) -> Result<Waterfall, OutOfOrder> {
+        let mut waterfall = Waterfall { parts: Vec::with_capacity(10) };
+        waterfall.push(Part::Filter, felt, published)?;
+        waterfall.until(Part::Card, read.requested)?;
+        waterfall.until(Part::Arbitration, read.granted)?;
+        waterfall.until(Part::Transfer, read.data_at)?;
+        Ok(waterfall)
+    }
+
+    /// On through the job that used the value, and the transfer that handed its result to another card.
+    pub fn hand_over(mut self, job: &JobRecord, block: &Transfer) -> Result<Waterfall, OutOfOrder> {
+        self.compute(job, block.requested)?;
+        self.until(Part::Arbitration, block.granted)?;
+        self.until(Part::Transfer, block.data_at)?;
+        Ok(self)
+    }
+
+    /// On through the job that used the value, to the write that it led to.
+    pub fn write(mut self, job: &JobRecord, write: &Transfer) -> Result<Waterfall, OutOfOrder> {
+        self.compute(job, write.requested)?;
+        self.until(Part::Write, write.data_at)?;
+        Ok(self)
+    }
+
+    /// Up to `end` the job either executes or waits; its execution is counted last, at most as much as
+    /// fits.
+    fn compute(&mut self, job: &JobRecord, end: Ns) -> Result<(), OutOfOrder> {
+        let between = end.saturating_sub(self.reached());
         let execution = job.execution_ns - job.entry_ns;
-        let computes = write.requested - execution.min(between);
-        let stamps = [
-            (Part::Filter, published),
-            (Part::Card, read.requested),
-            (Part::Arbitration, read.granted),
-            (Part::Transfer, read.data_at),
-            (Part::WaitForTask, computes),
-            (Part::Execution, write.requested),
-            (Part::Write, write.data_at),
-        ];
-        let mut begin = felt;
-        let mut parts = Vec::with_capacity(stamps.len());
-        for (part, end) in stamps {
-            if end < begin {
-                return Err(OutOfOrder { part, begin, end });
-            }
-            parts.push((part, begin, end));
-            begin = end;
+        self.until(Part::WaitForTask, end - execution.min(between))?;
+        self.until(Part::Execution, end)
+    }
+
+    fn until(&mut self, part: Part, end: Ns) -> Result<(), OutOfOrder> {
+        self.push(part, self.reached(), end)
+    }
+
+    fn push(&mut self, part: Part, begin: Ns, end: Ns) -> Result<(), OutOfOrder> {
+        if end < begin {
+            return Err(OutOfOrder { part, begin, end });
         }
-        Ok(Waterfall { parts })
+        self.parts.push((part, begin, end));
+        Ok(())
+    }
+
+    /// Last stamp so far.
+    pub fn reached(&self) -> Ns {
+        self.parts.last().map_or(0, |&(_, _, end)| end)
     }
 
     /// Time of one part.
     pub fn time(&self, part: Part) -> Ns {
-        self.parts
-            .iter()
-            .filter(|(of, ..)| *of == part)
-            .map(|(_, begin, end)| end - begin)
-            .sum()
+        self.parts.iter().filter(|(of, ..)| *of == part).map(|(_, begin, end)| end - begin).sum()
     }
 
     /// From the first stamp to the last one.
@@ -210,36 +210,13 @@ mod tests {
             write_ns: 400,
             ..Slave::default()
         };
-        let task = |name: &str| Task {
-            name: name.into(),
-            processor: name.into(),
-            period_ns: 100_000,
-            ..Task::default()
-        };
-        let rack = Rack {
-            slaves: vec![slave],
-            tasks: vec![task("a"), task("b")],
-            ..Rack::default()
-        };
+        let task =
+            |name: &str| Task { name: name.into(), processor: name.into(), period_ns: 100_000, ..Task::default() };
+        let rack = Rack { slaves: vec![slave], tasks: vec![task("a"), task("b")], ..Rack::default() };
         let mut timing = Timing::new(rack).unwrap();
-        let access = |dir| {
-            Op::Access(Access {
-                am: 0x39,
-                addr: 0x1000,
-                width: Width::D16,
-                dir,
-                n: 1,
-            })
-        };
+        let access = |dir| Op::Access(Access { am: 0x39, addr: 0x1000, width: Width::D16, dir, n: 1 });
         for t in 0..2 {
-            timing.set_program(
-                t,
-                &[
-                    access(Direction::Read),
-                    Op::Exec(20_000),
-                    access(Direction::Write),
-                ],
-            );
+            timing.set_program(t, &[access(Direction::Read), Op::Exec(20_000), access(Direction::Write)]);
         }
         let mut log = Log::default();
         timing.advance(90_000, &mut log);
@@ -249,45 +226,30 @@ mod tests {
     #[test]
     fn the_parts_of_a_waterfall_add_up_to_the_whole_to_the_nanosecond() {
         let (log, _) = log();
-        let of = |dir| {
-            *log.transfers
-                .iter()
-                .find(|t| t.task == 1 && t.access.dir == dir)
-                .unwrap()
-        };
+        let of = |dir| *log.transfers.iter().find(|t| t.task == 1 && t.access.dir == dir).unwrap();
         let (mut read, mut write) = (of(Direction::Read), of(Direction::Write));
         for transfer in [&mut read, &mut write] {
-            (transfer.requested, transfer.granted) =
-                (transfer.requested + 1_000, transfer.granted + 1_000);
+            (transfer.requested, transfer.granted) = (transfer.requested + 1_000, transfer.granted + 1_000);
             transfer.data_at += 1_000;
         }
         let job = *log.jobs.iter().find(|job| job.task == 1).unwrap();
-        let waterfall = Waterfall::new(100, 700, &read, &job, &write).unwrap();
-        let sum: Ns = waterfall
-            .parts
-            .iter()
-            .map(|(_, begin, end)| end - begin)
-            .sum();
+        let waterfall = Waterfall::begin(100, 700, &read).and_then(|way| way.write(&job, &write)).unwrap();
+        let sum: Ns = waterfall.parts.iter().map(|(_, begin, end)| end - begin).sum();
         assert_eq!(sum, write.data_at - 100);
         assert_eq!(waterfall.whole(), sum);
         assert_eq!(waterfall.time(Part::Filter), 600);
         assert_eq!(waterfall.time(Part::Execution), 20_000);
         // the rest of the handshake and the read's stall
         assert_eq!(waterfall.time(Part::WaitForTask), 100 + 300);
-        assert_eq!(
-            waterfall.time(Part::Arbitration),
-            read.granted - read.requested
-        );
-        assert!(Waterfall::new(100, 99, &read, &job, &write).is_err());
+        assert_eq!(waterfall.time(Part::Arbitration), read.granted - read.requested);
+        assert!(Waterfall::begin(100, 99, &read).is_err());
     }
 
     #[test]
     fn a_ledger_splits_each_masters_time_into_wait_and_service() {
         let (log, masters) = log();
         let mut ledger = Ledger::new(masters);
-        log.transfers
-            .iter()
-            .for_each(|transfer| ledger.transfer(transfer));
+        log.transfers.iter().for_each(|transfer| ledger.transfer(transfer));
         let held: Ns = ledger.masters.iter().map(|master| master.held_ns).sum();
         assert_eq!(held, log.transfers.iter().map(|t| t.held_ns).sum::<Ns>());
         assert_eq!(ledger.masters[0].transfers, 2);

@@ -4,9 +4,12 @@
 //! remote bus, whose time is the window's response time ([`crate::rack::Slave::adaptor`]). As a
 //! *master* it carries the accesses of a workstation: single accesses pay the link on the way in and
 //! out, block transfers a DMA set-up and then the link's rate. Without a link both faces fail with
-//! BERR*: windows do not answer, and a workstation's access ends in its adaptor after a time-out.
+//! BERR*: windows do not answer, and a workstation's access ends in its adaptor after a time-out. A workstation reaches
+//! what the adaptor maps into its own bus ([`Map`]); an access beside that ends in the adaptor too. The link checks parity:
+//! a transfer that fails the check ([`crate::FaultKind::Parity`]) ends in BERR*.
 
 use crate::Ns;
+use crate::program::Access;
 use crate::requester::ReleasePolicy;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +23,15 @@ pub enum Kind {
     /// The GIO bus of an SGI workstation.
     #[serde(rename = "VME-GIO")]
     VmeGio,
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Kind::VmeVme => "VME–VME",
+            Kind::VmeGio => "VME–GIO",
+        })
+    }
 }
 
 /// An adaptor card.
@@ -57,6 +69,21 @@ pub struct Adaptor {
     /// Whether the cable is plugged in.
     #[serde(default = "yes")]
     pub link: bool,
+    /// What the workstation sees of this bus; nothing stated: all of it, at the same addresses.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub maps: Vec<Map>,
+}
+
+/// A part of this bus as the workstation sees it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Map {
+    /// First byte address on the workstation's bus.
+    pub remote_base: u32,
+    /// First byte address on this bus.
+    pub base: u32,
+    /// Bytes.
+    pub size: u32,
 }
 
 fn link_read_ns() -> Ns {
@@ -93,7 +120,15 @@ impl Adaptor {
             dma_bytes_per_s: dma_bytes_per_s(),
             link_timeout_ns: link_timeout_ns(),
             link: true,
+            maps: Vec::new(),
         }
+    }
+
+    /// Whether the workstation's access lies in what is mapped.
+    pub fn reaches(&self, access: &Access) -> bool {
+        let end = u64::from(access.addr) + u64::from(access.n.max(1)) * u64::from(access.width.bytes());
+        let holds = |map: &Map| access.addr >= map.base && end <= u64::from(map.base) + u64::from(map.size);
+        self.maps.is_empty() || self.maps.iter().any(holds)
     }
 
     /// Time that the link needs for `bytes` of a block transfer, rounded up.
@@ -105,6 +140,16 @@ impl Adaptor {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_workstation_reaches_what_is_mapped_and_nothing_beside_it() {
+        let mut adaptor = Adaptor::new("vme-vme", Kind::VmeVme, 18);
+        let access = |addr, n| Access { am: 0x3D, addr, width: crate::Width::D32, dir: crate::Direction::Read, n };
+        assert!(adaptor.reaches(&access(0x0, 1)));
+        adaptor.maps.push(Map { remote_base: 0xF000_0000, base: 0x40_0000, size: 0x1_0000 });
+        assert!(adaptor.reaches(&access(0x40_0000, 0x4000)));
+        assert!(!adaptor.reaches(&access(0x40_0000, 0x4001)) && !adaptor.reaches(&access(0x3F_FFFC, 1)));
+    }
 
     #[test]
     fn a_long_dma_approaches_the_links_rate() {

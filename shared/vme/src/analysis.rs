@@ -47,28 +47,14 @@ impl Stream {
 pub fn sporadic(streams: &[Stream], i: usize) -> Option<Ns> {
     let own = streams[i];
     let higher = &streams[..i];
-    let blocking = streams[i + 1..]
-        .iter()
-        .map(|s| s.service_ns.saturating_sub(1))
-        .max()
-        .unwrap_or(0);
-    let load: f64 = streams[..=i]
-        .iter()
-        .map(|s| s.service_ns as f64 / s.period_ns as f64)
-        .sum();
+    let blocking = streams[i + 1..].iter().map(|s| s.service_ns.saturating_sub(1)).max().unwrap_or(0);
+    let load: f64 = streams[..=i].iter().map(|s| s.service_ns as f64 / s.period_ns as f64).sum();
     if load > 1.0 {
         return None;
     }
-    let demand = |streams: &[Stream], window| {
-        streams
-            .iter()
-            .map(|s| s.requests(window) * s.service_ns)
-            .sum::<Ns>()
-    };
+    let demand = |streams: &[Stream], window| streams.iter().map(|s| s.requests(window) * s.service_ns).sum::<Ns>();
     // ⌈(w + J)/T⌉ requests of every urgent enough stream: the level-i busy period
-    let busy = fixed_point(blocking + own.service_ns, |busy| {
-        blocking + demand(&streams[..=i], busy - 1)
-    })?;
+    let busy = fixed_point(blocking + own.service_ns, |busy| blocking + demand(&streams[..=i], busy - 1))?;
     let requests = (busy + own.jitter_ns).div_ceil(own.period_ns);
     let mut worst = 0;
     for q in 0..requests {
@@ -138,11 +124,15 @@ struct Analysis<'a> {
 /// Bounds of the timing plane's rack, where task `t` does `programs[t]` at most in each job.
 pub fn bounds(timing: &Timing, programs: &[Vec<Op>]) -> Bounds {
     let rack = timing.rack();
-    let mut analysis = Analysis {
-        timing,
-        demands: demands(timing, programs),
-        late: Vec::new(),
-    };
+    if rack.bus.constant_ns.is_some() {
+        // nobody waits for anybody, but what a job takes is not analysed then
+        return Bounds {
+            access: vec![None; rack.tasks.len()],
+            response: vec![None; rack.tasks.len()],
+            traffic: vec![None; rack.traffic.len()],
+        };
+    }
+    let mut analysis = Analysis { timing, demands: demands(timing, programs), late: Vec::new() };
     loop {
         let late_before = analysis.late.len();
         let in_time = |source, bound: Option<Ns>, period: Ns| {
@@ -150,29 +140,17 @@ pub fn bounds(timing: &Timing, programs: &[Vec<Op>]) -> Bounds {
             (source, bound)
         };
         let response: Vec<_> = (0..rack.tasks.len())
-            .map(|t| {
-                in_time(
-                    Source::Task(t),
-                    analysis.response(t, programs),
-                    rack.tasks[t].period_ns,
-                )
-            })
+            .map(|t| in_time(Source::Task(t), analysis.response(t, programs), rack.tasks[t].period_ns))
             .collect();
         let traffic: Vec<_> = (rack.traffic.iter().enumerate())
             .map(|(g, spec)| {
                 let periodic = spec.arrivals == Arrivals::Periodic;
-                let bound = analysis
-                    .access(Source::Traffic(g), &spec.access())
-                    .filter(|_| periodic);
+                let bound = analysis.access(Source::Traffic(g), &spec.access()).filter(|_| periodic);
                 in_time(Source::Traffic(g), bound, spec.period_ns)
             })
             .collect();
-        let late: Vec<Source> = response
-            .iter()
-            .chain(&traffic)
-            .filter(|(_, bound)| bound.is_none())
-            .map(|(source, _)| *source)
-            .collect();
+        let late: Vec<Source> =
+            response.iter().chain(&traffic).filter(|(_, bound)| bound.is_none()).map(|(source, _)| *source).collect();
         if late.len() == late_before {
             let access = (0..rack.tasks.len())
                 .map(|t| {
@@ -180,13 +158,8 @@ pub fn bounds(timing: &Timing, programs: &[Vec<Op>]) -> Bounds {
                     accesses(&programs[t]).map(bound).try_fold(0, longest)
                 })
                 .collect();
-            let bounds =
-                |of: Vec<(Source, Option<Ns>)>| of.into_iter().map(|(_, bound)| bound).collect();
-            return Bounds {
-                access,
-                response: bounds(response),
-                traffic: bounds(traffic),
-            };
+            let bounds = |of: Vec<(Source, Option<Ns>)>| of.into_iter().map(|(_, bound)| bound).collect();
+            return Bounds { access, response: bounds(response), traffic: bounds(traffic) };
         }
         // what rested on them has to be looked at again
         analysis.late = late;
@@ -198,13 +171,7 @@ fn longest(worst: Ns, bound: Option<Ns>) -> Option<Ns> {
 }
 
 fn accesses(program: &[Op]) -> impl Iterator<Item = Access> + '_ {
-    program.iter().filter_map(|op| {
-        if let Op::Access(access) = op {
-            Some(*access)
-        } else {
-            None
-        }
-    })
+    program.iter().filter_map(|op| if let Op::Access(access) = op { Some(*access) } else { None })
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -228,28 +195,15 @@ fn tenure(timing: &Timing, source: Source, access: &Access) -> Tenure {
     let (master, adaptor, splits) = match source {
         Source::Task(t) => {
             let p = wiring.processor_of_task[t] as usize;
-            (
-                wiring.processors[p].0,
-                wiring.processors[p].1,
-                rack.processors[p].splits_width,
-            )
+            (wiring.processors[p].0, wiring.processors[p].1, rack.processors[p].splits_width)
         }
         Source::Traffic(g) => (wiring.traffic[g].0, wiring.traffic[g].1, false),
     };
     let dma = adaptor.filter(|_| access.n > 1 || matches!(source, Source::Traffic(_)));
-    let pace = dma.map_or(0, |a| {
-        rack.adaptors[a as usize].pace_ns(access.width.bytes())
-    });
+    let pace = dma.map_or(0, |a| rack.adaptors[a as usize].pace_ns(access.width.bytes()));
     let arbitration = wiring.arbitration_ns(wiring.masters[master as usize].place.slot);
-    let mut tenure = Tenure {
-        total: 0,
-        burst: 0,
-        competes: 0,
-    };
-    for burst in wiring
-        .plan(access, splits)
-        .bursts(&rack.bus, access.addr, pace)
-    {
+    let mut tenure = Tenure { total: 0, burst: 0, competes: 0 };
+    for burst in wiring.plan(access, splits).bursts(&rack.bus, access.addr, pace) {
         tenure.total += arbitration + burst.done_ns;
         tenure.burst = tenure.burst.max(arbitration + burst.done_ns);
         tenure.competes += 1;
@@ -271,38 +225,15 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
         }
         let service_ns = tenures.iter().map(|tenure| tenure.total).sum();
         // a job that ends before the next release: its accesses come up to a period late
-        let stream = Some(Stream {
-            service_ns,
-            period_ns: task.period_ns,
-            jitter_ns: task.period_ns + release_jitter(task),
-        });
-        demands.push(Demand {
-            master,
-            source: Some(Source::Task(t)),
-            accesses: tenures,
-            stream,
-        });
+        let stream =
+            Some(Stream { service_ns, period_ns: task.period_ns, jitter_ns: task.period_ns + release_jitter(task) });
+        demands.push(Demand { master, source: Some(Source::Task(t)), accesses: tenures, stream });
         if let Release::Poll(poll) = &task.release {
-            let look = Access {
-                am: poll.am,
-                addr: poll.addr,
-                width: poll.width,
-                dir: Direction::Read,
-                n: 1,
-            };
+            let look = Access { am: poll.am, addr: poll.addr, width: poll.width, dir: Direction::Read, n: 1 };
             let look = tenure(timing, Source::Task(t), &look);
             let period_ns = poll.interval_ns + rack.bus.read_stall_ns + rack.bus.address_ns;
-            let stream = Some(Stream {
-                service_ns: look.total,
-                period_ns: period_ns.max(1),
-                jitter_ns: 0,
-            });
-            demands.push(Demand {
-                master,
-                source: None,
-                accesses: vec![look],
-                stream,
-            });
+            let stream = Some(Stream { service_ns: look.total, period_ns: period_ns.max(1), jitter_ns: 0 });
+            demands.push(Demand { master, source: None, accesses: vec![look], stream });
         }
     }
     for (i, (wire, spec)) in wiring.irqs.iter().zip(&rack.interrupters).enumerate() {
@@ -313,17 +244,9 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
         let accesses = service_tenures(timing, i);
         let service_ns = accesses.iter().map(|tenure| tenure.total).sum();
         // one in service and one pending may be left from before the window
-        let stream = spec.ticks.map(|ticks| Stream {
-            service_ns,
-            period_ns: ticks.period_ns,
-            jitter_ns: 2 * ticks.period_ns,
-        });
-        demands.push(Demand {
-            master,
-            source: None,
-            accesses,
-            stream,
-        });
+        let stream =
+            spec.ticks.map(|ticks| Stream { service_ns, period_ns: ticks.period_ns, jitter_ns: 2 * ticks.period_ns });
+        demands.push(Demand { master, source: None, accesses, stream });
     }
     for (g, traffic) in rack.traffic.iter().enumerate() {
         let tenure = tenure(timing, Source::Traffic(g), &traffic.access());
@@ -348,9 +271,7 @@ fn is_silent(rack: &Rack, i: usize, programs: &[Vec<Op>]) -> bool {
     let spec = &rack.interrupters[i];
     let raises = |op: &Op| matches!(op, Op::Raise(_));
     let monitored = |slave: &Slave| slave.monitor.as_ref() == Some(&spec.name);
-    spec.ticks.is_none()
-        && !rack.slaves.iter().any(monitored)
-        && !programs.iter().flatten().any(raises)
+    spec.ticks.is_none() && !rack.slaves.iter().any(monitored) && !programs.iter().flatten().any(raises)
 }
 
 /// The bus cycles of one interrupt's service: IACK, and the release of a RORA interrupter.
@@ -359,36 +280,17 @@ fn service_tenures(timing: &Timing, i: usize) -> Vec<Tenure> {
     let master = wiring.processors[wiring.irqs[i].handler as usize].0;
     let arbitration = wiring.arbitration_ns(wiring.masters[master as usize].place.slot);
     // any interrupter of the level may answer; the slowest one in the farthest slot is a bound
-    let answer = rack
-        .interrupters
-        .iter()
-        .map(|spec| spec.answer_ns)
-        .max()
-        .unwrap_or(0);
+    let answer = rack.interrupters.iter().map(|spec| spec.answer_ns).max().unwrap_or(0);
     let chain = rack.bus.chain_ns * Ns::from(SLOTS - 1);
     let cycle = arbitration + rack.bus.address_ns + answer + chain + rack.bus.handshake_ns;
-    let mut tenures = vec![Tenure {
-        total: cycle,
-        burst: cycle,
-        competes: 1,
-    }];
+    let mut tenures = vec![Tenure { total: cycle, burst: cycle, competes: 1 }];
     if let IrqRelease::Rora { am, addr, width } = rack.interrupters[i].release {
-        let write = Access {
-            am,
-            addr,
-            width,
-            dir: Direction::Write,
-            n: 1,
-        };
+        let write = Access { am, addr, width, dir: Direction::Write, n: 1 };
         let mut total = arbitration;
         for burst in wiring.plan(&write, false).bursts(&rack.bus, addr, 0) {
             total += burst.done_ns;
         }
-        tenures.push(Tenure {
-            total,
-            burst: total,
-            competes: 1,
-        });
+        tenures.push(Tenure { total, burst: total, competes: 1 });
     }
     tenures
 }
@@ -407,10 +309,7 @@ impl Analysis<'_> {
     /// Longest time for which `owner` keeps the bus from `master`, who asks for it.
     fn hold(&self, owner: u16, master: u16) -> Ns {
         let wiring = self.timing.wiring();
-        let (owning, asking) = (
-            &wiring.masters[owner as usize],
-            &wiring.masters[master as usize],
-        );
+        let (owning, asking) = (&wiring.masters[owner as usize], &wiring.masters[master as usize]);
         let bclr = self.mode() == Mode::Pri && asking.place.level > owning.place.level;
         let yields = match owning.release {
             ReleasePolicy::WhenDone => false,
@@ -419,10 +318,7 @@ impl Analysis<'_> {
         };
         let of = |tenure: &Tenure| if yields { tenure.burst } else { tenure.total };
         let own = self.demands.iter().filter(|demand| demand.master == owner);
-        own.flat_map(|demand| &demand.accesses)
-            .map(of)
-            .max()
-            .unwrap_or(0)
+        own.flat_map(|demand| &demand.accesses).map(of).max().unwrap_or(0)
     }
 
     /// Longest time from the request of an access to the free bus.
@@ -462,38 +358,21 @@ impl Analysis<'_> {
                 Some(total + competes * levels.iter().sum::<Ns>())
             }
             Mode::Pri | Mode::Sgl => {
-                let (higher, lower): (Vec<u16>, Vec<u16>) =
-                    others.partition(|&m| self.rank(m) < self.rank(master));
-                let blocking = lower
-                    .iter()
-                    .map(|&m| self.hold(m, master))
-                    .max()
-                    .unwrap_or(0)
-                    .saturating_sub(1);
+                let (higher, lower): (Vec<u16>, Vec<u16>) = others.partition(|&m| self.rank(m) < self.rank(master));
+                let blocking = lower.iter().map(|&m| self.hold(m, master)).max().unwrap_or(0).saturating_sub(1);
                 let mut streams = Vec::new();
-                for demand in self
-                    .demands
-                    .iter()
-                    .filter(|demand| higher.contains(&demand.master))
-                {
+                for demand in self.demands.iter().filter(|demand| higher.contains(&demand.master)) {
                     if demand.accesses.is_empty() {
                         continue;
                     }
-                    if demand
-                        .source
-                        .is_some_and(|source| self.late.contains(&source))
-                    {
+                    if demand.source.is_some_and(|source| self.late.contains(&source)) {
                         return None;
                     }
                     streams.push(demand.stream?);
                 }
                 let alone = total + competes * blocking;
                 fixed_point(alone, |window| {
-                    alone
-                        + streams
-                            .iter()
-                            .map(|s| s.requests(window) * s.service_ns)
-                            .sum::<Ns>()
+                    alone + streams.iter().map(|s| s.requests(window) * s.service_ns).sum::<Ns>()
                 })
             }
         }
@@ -504,34 +383,18 @@ impl Analysis<'_> {
         let wiring = self.timing.wiring();
         let rack = self.timing.rack();
         let own = |p: usize| wiring.processors[p].0 == master;
-        let buffers = (0..rack.processors.len())
-            .any(|p| own(p) && rack.processors[p].posted_write_ns.is_some());
+        let buffers = (0..rack.processors.len()).any(|p| own(p) && rack.processors[p].posted_write_ns.is_some());
         let generators = wiring.traffic.iter().filter(|t| t.0 == master).count();
         let processors = (0..rack.processors.len()).filter(|&p| own(p)).count();
         let clients = processors + generators + usize::from(buffers);
-        let each = self
-            .demands
-            .iter()
-            .filter(|demand| demand.master == master)
-            .flat_map(|demand| &demand.accesses);
-        let worst = each.fold(
-            Tenure {
-                total: 0,
-                burst: 0,
-                competes: 0,
-            },
-            |worst, tenure| Tenure {
-                total: worst.total.max(tenure.total),
-                burst: worst.burst.max(tenure.burst),
-                competes: worst.competes.max(tenure.competes),
-            },
-        );
+        let each = self.demands.iter().filter(|demand| demand.master == master).flat_map(|demand| &demand.accesses);
+        let worst = each.fold(Tenure { total: 0, burst: 0, competes: 0 }, |worst, tenure| Tenure {
+            total: worst.total.max(tenure.total),
+            burst: worst.burst.max(tenure.burst),
+            competes: worst.competes.max(tenure.competes),
+        });
         let before = clients.saturating_sub(1) as Ns;
-        Tenure {
-            total: worst.total * before,
-            burst: worst.burst,
-            competes: worst.competes * before,
-        }
+        Tenure { total: worst.total * before, burst: worst.burst, competes: worst.competes * before }
     }
 
     /// Time for which an access of task `t` stalls its processor.
@@ -541,8 +404,7 @@ impl Analysis<'_> {
         let beyond = match wiring.processors[p].1 {
             Some(adaptor) => {
                 let spec = &rack.adaptors[adaptor as usize];
-                spec.link_read_ns.max(spec.link_write_ns)
-                    + if access.n > 1 { spec.dma_setup_ns } else { 0 }
+                spec.link_read_ns.max(spec.link_write_ns) + if access.n > 1 { spec.dma_setup_ns } else { 0 }
             }
             None => rack.bus.read_stall_ns + rack.processors[p].posted_write_ns.unwrap_or(0),
         };
@@ -583,11 +445,7 @@ impl Analysis<'_> {
             }
             let jitter_ns = release_jitter(spec);
             let service_ns = self.job(urgent as usize, programs)?;
-            interference.push(Stream {
-                service_ns,
-                period_ns: spec.period_ns,
-                jitter_ns,
-            });
+            interference.push(Stream { service_ns, period_ns: spec.period_ns, jitter_ns });
         }
         for (i, spec) in rack.interrupters.iter().enumerate() {
             let wire = &wiring.irqs[i];
@@ -602,35 +460,19 @@ impl Analysis<'_> {
                 }
             }
             let period_ns = spec.ticks?.period_ns;
-            interference.push(Stream {
-                service_ns,
-                period_ns,
-                jitter_ns: 2 * period_ns,
-            });
+            interference.push(Stream { service_ns, period_ns, jitter_ns: 2 * period_ns });
         }
         let mut blocking = 0;
         for &lazy in &tasks[at + 1..] {
             let mut stalls = accesses(&programs[lazy as usize]);
-            blocking = stalls.try_fold(blocking, |worst, access| {
-                longest(worst, self.stall(lazy as usize, &access))
-            })?;
+            blocking = stalls.try_fold(blocking, |worst, access| longest(worst, self.stall(lazy as usize, &access)))?;
             if let Release::Poll(poll) = &rack.tasks[lazy as usize].release {
-                let look = Access {
-                    am: poll.am,
-                    addr: poll.addr,
-                    width: poll.width,
-                    dir: Direction::Read,
-                    n: 1,
-                };
+                let look = Access { am: poll.am, addr: poll.addr, width: poll.width, dir: Direction::Read, n: 1 };
                 blocking = blocking.max(self.stall(lazy as usize, &look)?);
             }
         }
         fixed_point(own + blocking, |window| {
-            own + blocking
-                + interference
-                    .iter()
-                    .map(|s| s.requests(window) * s.service_ns)
-                    .sum::<Ns>()
+            own + blocking + interference.iter().map(|s| s.requests(window) * s.service_ns).sum::<Ns>()
         })
     }
 }
@@ -640,11 +482,7 @@ mod tests {
     use super::*;
 
     fn stream(service_ns: Ns, period_ns: Ns) -> Stream {
-        Stream {
-            service_ns,
-            period_ns,
-            jitter_ns: 0,
-        }
+        Stream { service_ns, period_ns, jitter_ns: 0 }
     }
 
     #[test]

@@ -26,6 +26,16 @@ pub enum Mode {
     Sgl,
 }
 
+impl std::fmt::Display for Mode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Mode::Pri => "PRI",
+            Mode::Rrs => "RRS",
+            Mode::Sgl => "SGL",
+        })
+    }
+}
+
 /// A requester, as the arbiter and the daisy chain see it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
@@ -48,11 +58,7 @@ pub struct Arbiter {
 impl Arbiter {
     /// No requests; the first round starts at BR3*.
     pub fn new(mode: Mode) -> Arbiter {
-        Arbiter {
-            mode,
-            requests: [0; LEVELS],
-            last: 0,
-        }
+        Arbiter { mode, requests: [0; LEVELS], last: 0 }
     }
 
     /// The requester drives its BR* line.
@@ -79,10 +85,7 @@ impl Arbiter {
 
     /// BCLR*: the owner of this level is asked to leave for a higher one (PRI only).
     pub fn bclr(&self, owner: Place) -> bool {
-        self.mode == Mode::Pri
-            && self.requests[owner.level as usize + 1..]
-                .iter()
-                .any(|&slots| slots != 0)
+        self.mode == Mode::Pri && self.requests[owner.level as usize + 1..].iter().any(|&slots| slots != 0)
     }
 
     /// BG*: grants the bus, if anybody wants it; its BR* line is released.
@@ -94,10 +97,7 @@ impl Arbiter {
                 .find(|&level| self.requests[level] != 0)?,
             Mode::Sgl => Some(LEVELS - 1).filter(|&level| self.requests[level] != 0)?,
         };
-        let place = Place {
-            level: level as u8,
-            slot: self.requests[level].trailing_zeros() as u8,
-        };
+        let place = Place { level: level as u8, slot: self.requests[level].trailing_zeros() as u8 };
         self.last = place.level;
         self.withdraw(place);
         Some(place)
@@ -113,9 +113,7 @@ mod tests {
         for &(level, slot) in wanted {
             arbiter.request(Place { level, slot });
         }
-        std::iter::from_fn(|| arbiter.grant())
-            .map(|place| (place.level, place.slot))
-            .collect()
+        std::iter::from_fn(|| arbiter.grant()).map(|place| (place.level, place.slot)).collect()
     }
 
     #[test]
@@ -126,19 +124,13 @@ mod tests {
 
     #[test]
     fn sgl_hears_br3_alone() {
-        assert_eq!(
-            places(Mode::Sgl, &[(2, 1), (3, 7), (3, 3)]),
-            [(3, 3), (3, 7)]
-        );
+        assert_eq!(places(Mode::Sgl, &[(2, 1), (3, 7), (3, 3)]), [(3, 3), (3, 7)]);
     }
 
     #[test]
     fn rrs_goes_down_from_the_level_granted_last() {
         let mut arbiter = Arbiter::new(Mode::Rrs);
-        let all = [3, 2, 1, 0].map(|level| Place {
-            level,
-            slot: level + 2,
-        });
+        let all = [3, 2, 1, 0].map(|level| Place { level, slot: level + 2 });
         all.iter().for_each(|&place| arbiter.request(place));
         let mut levels = Vec::new();
         for _ in 0..8 {
@@ -166,12 +158,9 @@ mod tests {
     #[test]
     fn bclr_is_driven_for_higher_levels_in_pri_only() {
         let owner = Place { level: 1, slot: 4 };
-        for (mode, level, expected) in [
-            (Mode::Pri, 2, true),
-            (Mode::Pri, 1, false),
-            (Mode::Pri, 0, false),
-            (Mode::Rrs, 3, false),
-        ] {
+        for (mode, level, expected) in
+            [(Mode::Pri, 2, true), (Mode::Pri, 1, false), (Mode::Pri, 0, false), (Mode::Rrs, 3, false)]
+        {
             let mut arbiter = Arbiter::new(mode);
             arbiter.request(Place { level, slot: 3 });
             assert_eq!(arbiter.bclr(owner), expected, "{mode:?} {level}");

@@ -79,35 +79,14 @@ pub fn plan(bus: &Bus, access: &Access, slave: Option<(u16, &Slave)>, splits: bo
     if access.is_address_only() {
         // nobody has to answer: no DS*, no DTACK*
         let slave = slave.map(|(index, _)| index);
-        return Plan {
-            slave,
-            good: cycles,
-            fails: false,
-            bytes,
-            answer_ns: 0,
-            block: false,
-        };
+        return Plan { slave, good: cycles, fails: false, bytes, answer_ns: 0, block: false };
     }
     let Some((index, window)) = slave else {
-        return Plan {
-            slave: None,
-            good: 0,
-            fails: true,
-            bytes,
-            answer_ns: 0,
-            block,
-        };
+        return Plan { slave: None, good: 0, fails: true, bytes, answer_ns: 0, block };
     };
     let (bytes, cycles) = match fit(access, window) {
         Some(Misfit::TooWide | Misfit::Misaligned) if !splits => {
-            return Plan {
-                slave: Some(index),
-                good: 0,
-                fails: true,
-                bytes,
-                answer_ns: 0,
-                block,
-            };
+            return Plan { slave: Some(index), good: 0, fails: true, bytes, answer_ns: 0, block };
         }
         Some(Misfit::TooWide | Misfit::Misaligned) => {
             let narrow = split_width(access.addr, window.width.min(access.width)).bytes();
@@ -121,14 +100,7 @@ pub fn plan(bus: &Bus, access: &Access, slave: Option<(u16, &Slave)>, splits: bo
         Direction::Write => window.write_ns,
         Direction::Read => window.read_ns,
     };
-    Plan {
-        slave: Some(index),
-        good: cycles.min(room),
-        fails: cycles > room,
-        bytes,
-        answer_ns,
-        block,
-    }
+    Plan { slave: Some(index), good: cycles.min(room), fails: cycles > room, bytes, answer_ns, block }
 }
 
 /// The first rule that an access to this window breaks; `None` where it fits.
@@ -184,37 +156,18 @@ impl Plan {
         if cycles == 0 {
             let data_ns = bus.address_ns + bus.bus_timer_ns;
             let done_ns = data_ns + bus.handshake_ns;
-            return Burst {
-                cycles: 0,
-                data_ns,
-                done_ns,
-                last: true,
-                status: Status::BusError,
-            };
+            return Burst { cycles: 0, data_ns, done_ns, last: true, status: Status::BusError };
         }
         let first = bus.address_ns + self.answer_ns;
-        let data_ns =
-            first + Ns::from(cycles - 1) * (bus.handshake_ns + self.answer_ns).max(pace_ns);
+        let data_ns = first + Ns::from(cycles - 1) * (bus.handshake_ns + self.answer_ns).max(pace_ns);
         let last = cycles == left && !self.fails;
         // single cycles behind a slow link keep the bus until the link takes the next one
-        let done_ns =
-            (data_ns + bus.handshake_ns).max(if self.block || last { 0 } else { pace_ns });
-        Burst {
-            cycles,
-            data_ns,
-            done_ns,
-            last,
-            status: Status::Ok,
-        }
+        let done_ns = (data_ns + bus.handshake_ns).max(if self.block || last { 0 } else { pace_ns });
+        Burst { cycles, data_ns, done_ns, last, status: Status::Ok }
     }
 
     /// All bursts of the access, in order.
-    pub fn bursts<'a>(
-        &'a self,
-        bus: &'a Bus,
-        addr: u32,
-        pace_ns: Ns,
-    ) -> impl Iterator<Item = Burst> + 'a {
+    pub fn bursts<'a>(&'a self, bus: &'a Bus, addr: u32, pace_ns: Ns) -> impl Iterator<Item = Burst> + 'a {
         let mut next = Some(0);
         std::iter::from_fn(move || {
             let done = next?;
@@ -243,13 +196,7 @@ mod tests {
     }
 
     fn access(am: u8, addr: u32, width: Width, dir: Direction, n: u32) -> Access {
-        Access {
-            am,
-            addr,
-            width,
-            dir,
-            n,
-        }
+        Access { am, addr, width, dir, n }
     }
 
     #[test]
@@ -263,13 +210,7 @@ mod tests {
     #[test]
     fn read_modify_write_holds_the_bus_for_both_halves() {
         let (bus, ram) = (Bus::default(), ram());
-        let rmw = access(
-            0x39 | READ_MODIFY_WRITE,
-            0x1000,
-            Width::D16,
-            Direction::Write,
-            1,
-        );
+        let rmw = access(0x39 | READ_MODIFY_WRITE, 0x1000, Width::D16, Direction::Write, 1);
         let burst = plan(&bus, &rmw, Some((0, &ram)), false).burst(&bus, rmw.addr, 0, 0);
         assert_eq!(burst.data_ns, 35 + 200 + 100 + 150);
     }
@@ -278,26 +219,14 @@ mod tests {
     fn a_block_transfer_is_cut_at_every_256_bytes() {
         let (bus, ram) = (Bus::default(), ram());
         // 16 bytes before the boundary, then 256, then 8
-        let block = access(
-            0x3B,
-            0x10F0,
-            Width::D16,
-            Direction::Read,
-            (16 + 256 + 8) / 2,
-        );
+        let block = access(0x3B, 0x10F0, Width::D16, Direction::Read, (16 + 256 + 8) / 2);
         let plan = plan(&bus, &block, Some((0, &ram)), false);
-        let cycles: Vec<u32> = plan
-            .bursts(&bus, block.addr, 0)
-            .map(|burst| burst.cycles)
-            .collect();
+        let cycles: Vec<u32> = plan.bursts(&bus, block.addr, 0).map(|burst| burst.cycles).collect();
         assert_eq!(cycles, [8, 128, 4]);
         // within a block the address is set up once: 35 + n·(200 + 100)
         assert_eq!(plan.burst(&bus, block.addr, 8, 0).done_ns, 35 + 128 * 300);
         // a slower link sets the pace
-        assert_eq!(
-            plan.burst(&bus, block.addr, 8, 400).data_ns,
-            235 + 127 * 400
-        );
+        assert_eq!(plan.burst(&bus, block.addr, 8, 400).data_ns, 235 + 127 * 400);
     }
 
     #[test]
@@ -305,10 +234,7 @@ mod tests {
         let bus = Bus::default();
         let read = access(0x39, 0x9000, Width::D16, Direction::Read, 1);
         let burst = plan(&bus, &read, None, false).burst(&bus, read.addr, 0, 0);
-        assert_eq!(
-            (burst.status, burst.data_ns),
-            (Status::BusError, 35 + 64_000)
-        );
+        assert_eq!((burst.status, burst.data_ns), (Status::BusError, 35 + 64_000));
     }
 
     #[test]

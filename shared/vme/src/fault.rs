@@ -30,6 +30,8 @@ pub enum FaultKind {
     LostInterrupt(u16),
     /// The cable of this adaptor is out.
     CableOut(u16),
+    /// Transfers over the link of this adaptor fail its parity check: BERR*.
+    Parity(u16),
     /// Execution times of this task are multiplied by `percent`/100.
     Slow {
         /// The task.
@@ -51,25 +53,15 @@ pub struct FaultPlan {
 impl FaultPlan {
     /// The end of the latest fault of this kind that holds at `now`, if any does.
     pub fn holds(&self, now: Ns, kind: FaultKind) -> Option<Ns> {
-        self.faults
-            .iter()
-            .filter(|f| f.kind == kind && f.from_ns <= now && now < f.until_ns)
-            .map(|f| f.until_ns)
-            .max()
+        self.faults.iter().filter(|f| f.kind == kind && f.from_ns <= now && now < f.until_ns).map(|f| f.until_ns).max()
     }
 
     /// Execution time of the task's operation at `now`.
     pub fn stretched(&self, now: Ns, task: u16, exec: Ns) -> Ns {
-        self.faults
-            .iter()
-            .filter(|f| f.from_ns <= now && now < f.until_ns)
-            .fold(exec, |exec, f| match f.kind {
-                FaultKind::Slow {
-                    task: slow,
-                    percent,
-                } if slow == task => exec.saturating_mul(percent.into()) / 100,
-                _ => exec,
-            })
+        self.faults.iter().filter(|f| f.from_ns <= now && now < f.until_ns).fold(exec, |exec, f| match f.kind {
+            FaultKind::Slow { task: slow, percent } if slow == task => exec.saturating_mul(percent.into()) / 100,
+            _ => exec,
+        })
     }
 }
 
@@ -79,31 +71,16 @@ mod tests {
 
     #[test]
     fn a_fault_holds_from_its_begin_up_to_but_not_at_its_end() {
-        let plan = FaultPlan {
-            faults: vec![Fault {
-                from_ns: 10,
-                until_ns: 20,
-                kind: FaultKind::StuckBus,
-            }],
-        };
+        let plan = FaultPlan { faults: vec![Fault { from_ns: 10, until_ns: 20, kind: FaultKind::StuckBus }] };
         let held = |now| plan.holds(now, FaultKind::StuckBus);
-        assert_eq!(
-            (held(9), held(10), held(19), held(20)),
-            (None, Some(20), Some(20), None)
-        );
+        assert_eq!((held(9), held(10), held(19), held(20)), (None, Some(20), Some(20), None));
         assert_eq!(plan.holds(15, FaultKind::NoSlave(0)), None);
     }
 
     #[test]
     fn slow_factors_multiply() {
-        let slow = |task, percent| Fault {
-            from_ns: 0,
-            until_ns: 100,
-            kind: FaultKind::Slow { task, percent },
-        };
-        let plan = FaultPlan {
-            faults: vec![slow(1, 200), slow(1, 150), slow(2, 900)],
-        };
+        let slow = |task, percent| Fault { from_ns: 0, until_ns: 100, kind: FaultKind::Slow { task, percent } };
+        let plan = FaultPlan { faults: vec![slow(1, 200), slow(1, 150), slow(2, 900)] };
         assert_eq!(plan.stretched(5, 1, 1000), 3000);
     }
 }

@@ -90,10 +90,7 @@ impl Line {
 
 /// The IACK daisy chain: the interrupter that answers at `level`, by nearness to slot 1.
 pub fn acknowledged(level: u8, requests: impl Iterator<Item = (usize, u8, u8)>) -> Option<usize> {
-    requests
-        .filter(|&(_, l, _)| l == level)
-        .min_by_key(|&(_, _, slot)| slot)
-        .map(|(index, _, _)| index)
+    requests.filter(|&(_, l, _)| l == level).min_by_key(|&(_, _, slot)| slot).map(|(index, _, _)| index)
 }
 
 #[cfg(test)]

@@ -3,18 +3,7 @@
 use crate::Ns;
 
 /// Data width of a cycle.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    serde::Serialize,
-    serde::Deserialize,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Width {
     /// Byte.
     D8,
@@ -82,8 +71,7 @@ impl Access {
 
     /// Whether the master waits for a slave's data.
     pub const fn awaits_data(&self) -> bool {
-        !self.is_address_only()
-            && (matches!(self.dir, Direction::Read) || self.reads_and_modifies())
+        !self.is_address_only() && (matches!(self.dir, Direction::Read) || self.reads_and_modifies())
     }
 }
 

@@ -87,23 +87,14 @@ pub fn simulate(offered: &Offered) -> Result<Observed, OfferError> {
     let mut now: Ns = 0;
     for _ in 0..offered.transfers {
         let place = loop {
-            for queue in queues
-                .iter_mut()
-                .filter(|queue| !queue.asked && queue.arrivals.next() <= now)
-            {
+            for queue in queues.iter_mut().filter(|queue| !queue.asked && queue.arrivals.next() <= now) {
                 queue.asked = true;
                 arbiter.request(queue.place);
             }
             match arbiter.grant() {
                 Some(place) => break place,
                 // the bus is idle until the next arrival
-                None => {
-                    now = queues
-                        .iter()
-                        .map(|queue| queue.arrivals.next())
-                        .min()
-                        .unwrap_or(now)
-                }
+                None => now = queues.iter().map(|queue| queue.arrivals.next()).min().unwrap_or(now),
             }
         };
         let Some(queue) = queues.iter_mut().find(|queue| queue.place == place) else {
@@ -119,36 +110,24 @@ pub fn simulate(offered: &Offered) -> Result<Observed, OfferError> {
         now += offered.service_ns;
     }
     let level = |level: usize| {
-        let queue = queues
-            .iter()
-            .find(|queue| requester(offered.mode, level) == queue.place);
+        let queue = queues.iter().find(|queue| requester(offered.mode, level) == queue.place);
         let n = queue.map_or(0, |queue| queue.n);
         let served = queue.filter(|_| n > 0);
         Level {
             level,
             n,
             mean_wait_ns: served.map(|queue| queue.wait_sum as f64 / n as f64),
-            p99_wait_ns: served
-                .map(|queue| queue.waits.value_at_quantile(0.99).min(queue.wait_max)),
+            p99_wait_ns: served.map(|queue| queue.waits.value_at_quantile(0.99).min(queue.wait_max)),
             max_wait_ns: served.map(|queue| queue.wait_max),
-            utilisation: if now == 0 {
-                0.0
-            } else {
-                (n * offered.service_ns) as f64 / now as f64
-            },
+            utilisation: if now == 0 { 0.0 } else { (n * offered.service_ns) as f64 / now as f64 },
         }
     };
-    Ok(Observed {
-        levels: (0..LEVELS).rev().map(level).collect(),
-        simulated_ns: now,
-    })
+    Ok(Observed { levels: (0..LEVELS).rev().map(level).collect(), simulated_ns: now })
 }
 
 fn queues(offered: &Offered) -> Result<Vec<Queue>, OfferError> {
     if !(1..=1_000_000_000).contains(&offered.service_ns) {
-        return Err(OfferError::Service {
-            service_ns: offered.service_ns,
-        });
+        return Err(OfferError::Service { service_ns: offered.service_ns });
     }
     let mut queues = Vec::with_capacity(LEVELS);
     for (level, &load) in offered.load.iter().enumerate() {
@@ -167,28 +146,17 @@ fn queues(offered: &Offered) -> Result<Vec<Queue>, OfferError> {
             n: 0,
             wait_sum: 0,
             wait_max: 0,
-            waits: Histogram::new_with_max(LONGEST, 3)
-                .unwrap_or_else(|error| unreachable!("constant bounds: {error}")),
+            waits: Histogram::new_with_max(LONGEST, 3).unwrap_or_else(|error| unreachable!("constant bounds: {error}")),
         });
     }
-    if queues.is_empty() {
-        Err(OfferError::NoLoad)
-    } else {
-        Ok(queues)
-    }
+    if queues.is_empty() { Err(OfferError::NoLoad) } else { Ok(queues) }
 }
 
 fn requester(mode: Mode, level: usize) -> Place {
     let slot = (LEVELS - level) as u8;
     match mode {
-        Mode::Pri | Mode::Rrs => Place {
-            level: level as u8,
-            slot,
-        },
-        Mode::Sgl => Place {
-            level: LEVELS as u8 - 1,
-            slot,
-        },
+        Mode::Pri | Mode::Rrs => Place { level: level as u8, slot },
+        Mode::Sgl => Place { level: LEVELS as u8 - 1, slot },
     }
 }
 
@@ -199,24 +167,10 @@ mod tests {
     const SERVICE: Ns = 1_000;
 
     fn waits(mode: Mode, load: [f64; LEVELS], transfers: u64, seed: u64) -> Vec<f64> {
-        let offered = Offered {
-            mode,
-            service_ns: SERVICE,
-            load,
-            arrivals: Arrivals::Poisson,
-            transfers,
-            seed,
-        };
+        let offered = Offered { mode, service_ns: SERVICE, load, arrivals: Arrivals::Poisson, transfers, seed };
         let observed = simulate(&offered).unwrap();
-        assert_eq!(
-            observed.levels.iter().map(|level| level.n).sum::<u64>(),
-            transfers
-        );
-        observed
-            .levels
-            .iter()
-            .map(|level| level.mean_wait_ns.unwrap_or(0.0) / SERVICE as f64)
-            .collect()
+        assert_eq!(observed.levels.iter().map(|level| level.n).sum::<u64>(), transfers);
+        observed.levels.iter().map(|level| level.mean_wait_ns.unwrap_or(0.0) / SERVICE as f64).collect()
     }
 
     /// Waits of M/D/1 and of non-preemptive priority against their closed forms, `slack` times as far
@@ -228,19 +182,13 @@ mod tests {
                     let wait = waits(mode, [0.0, 0.0, 0.0, rho], transfers, seed)[0];
                     let expected = rho / (2.0 * (1.0 - rho));
                     let off = (wait / expected - 1.0).abs();
-                    assert!(
-                        off < 0.02 * slack,
-                        "M/D/1 at {rho}, seed {seed}: {wait}, expected {expected}"
-                    );
+                    assert!(off < 0.02 * slack, "M/D/1 at {rho}, seed {seed}: {wait}, expected {expected}");
                 }
             }
             let wait = waits(Mode::Pri, [0.0, 0.3, 0.3, 0.2], transfers, seed);
             for (wait, expected) in wait.iter().zip([0.5, 1.0, 4.0]) {
                 let off = (wait / expected - 1.0).abs();
-                assert!(
-                    off < 0.03 * slack,
-                    "PRI, seed {seed}: {wait}, expected {expected}"
-                );
+                assert!(off < 0.03 * slack, "PRI, seed {seed}: {wait}, expected {expected}");
             }
         }
     }
@@ -261,10 +209,7 @@ mod tests {
     #[test]
     fn the_daisy_chain_gives_the_same_order_as_priority_levels() {
         let load = [0.0, 0.3, 0.3, 0.2];
-        assert_eq!(
-            waits(Mode::Sgl, load, 50_000, 3),
-            waits(Mode::Pri, load, 50_000, 3)
-        );
+        assert_eq!(waits(Mode::Sgl, load, 50_000, 3), waits(Mode::Pri, load, 50_000, 3));
     }
 
     #[test]
@@ -278,18 +223,9 @@ mod tests {
                 transfers: 40_000,
                 seed: 5,
             };
-            simulate(&offered)
-                .unwrap()
-                .levels
-                .iter()
-                .map(|level| level.n)
-                .collect::<Vec<_>>()
+            simulate(&offered).unwrap().levels.iter().map(|level| level.n).collect::<Vec<_>>()
         };
-        assert!(
-            served(Mode::Rrs).iter().all(|n| n.abs_diff(10_000) < 100),
-            "{:?}",
-            served(Mode::Rrs)
-        );
+        assert!(served(Mode::Rrs).iter().all(|n| n.abs_diff(10_000) < 100), "{:?}", served(Mode::Rrs));
         let priority = served(Mode::Pri);
         assert!(priority[0] > 35_000 && priority[3] < 100, "{priority:?}");
     }
@@ -320,37 +256,10 @@ mod tests {
             seed: 0,
         };
         let refused = |offered: Offered| simulate(&offered).unwrap_err();
-        assert_eq!(
-            refused(Offered {
-                service_ns: 0,
-                ..good.clone()
-            }),
-            OfferError::Service { service_ns: 0 }
-        );
-        assert_eq!(
-            refused(Offered {
-                load: [0.0; LEVELS],
-                ..good.clone()
-            }),
-            OfferError::NoLoad
-        );
+        assert_eq!(refused(Offered { service_ns: 0, ..good.clone() }), OfferError::Service { service_ns: 0 });
+        assert_eq!(refused(Offered { load: [0.0; LEVELS], ..good.clone() }), OfferError::NoLoad);
         let load = [0.0, -0.5, 0.0, 0.0];
-        assert_eq!(
-            refused(Offered {
-                load,
-                ..good.clone()
-            }),
-            OfferError::Load {
-                level: 1,
-                load: -0.5
-            }
-        );
-        assert!(matches!(
-            refused(Offered {
-                load: [f64::NAN; LEVELS],
-                ..good
-            }),
-            OfferError::Load { level: 0, .. }
-        ));
+        assert_eq!(refused(Offered { load, ..good.clone() }), OfferError::Load { level: 1, load: -0.5 });
+        assert!(matches!(refused(Offered { load: [f64::NAN; LEVELS], ..good }), OfferError::Load { level: 0, .. }));
     }
 }

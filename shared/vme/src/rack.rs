@@ -55,6 +55,10 @@ pub struct Bus {
     pub bus_timer_ns: Ns,
     /// BR* to giving up where the bus is not granted (64 µs–1 ms, A).
     pub access_timer_ns: Ns,
+    /// Each access of a program takes this long, whatever its slave and whoever else is on the bus: a bus that is not
+    /// modelled, to compare with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub constant_ns: Option<Ns>,
 }
 
 impl Default for Bus {
@@ -68,6 +72,7 @@ impl Default for Bus {
             read_stall_ns: 300,
             bus_timer_ns: 64_000,
             access_timer_ns: 1_000_000,
+            constant_ns: None,
         }
     }
 }
@@ -103,6 +108,9 @@ pub struct Slave {
     /// The window leads through this adaptor to another bus, and answers only while its link is up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adaptor: Option<String>,
+    /// Where the window lies on that other bus; default: at the same address.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remote_base: Option<u32>,
 }
 
 impl Slave {

@@ -22,6 +22,16 @@ pub enum ReleasePolicy {
     OnBclr,
 }
 
+impl std::fmt::Display for ReleasePolicy {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            ReleasePolicy::WhenDone => "RWD",
+            ReleasePolicy::OnRequest => "ROR",
+            ReleasePolicy::OnBclr => "release on BCLR*",
+        })
+    }
+}
+
 /// Who is told of the end of a transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Client {
@@ -63,11 +73,7 @@ pub struct Requester {
 
 impl Clone for Requester {
     fn clone(&self) -> Self {
-        Requester {
-            place: self.place,
-            release: self.release,
-            queue: self.queue.clone(),
-        }
+        Requester { place: self.place, release: self.release, queue: self.queue.clone() }
     }
     // keeps the queue's memory: the chassis copies the timing plane every window
     fn clone_from(&mut self, from: &Self) {

@@ -17,9 +17,7 @@ pub struct Ticks {
 impl Ticks {
     /// Tick `k`; [`Ns::MAX`] beyond the end of time.
     pub fn at(self, k: u64) -> Ns {
-        k.checked_mul(self.period_ns)
-            .and_then(|t| t.checked_add(self.offset_ns))
-            .unwrap_or(Ns::MAX)
+        k.checked_mul(self.period_ns).and_then(|t| t.checked_add(self.offset_ns)).unwrap_or(Ns::MAX)
     }
 }
 
@@ -29,10 +27,7 @@ mod tests {
 
     #[test]
     fn ticks_do_not_drift_and_do_not_overflow() {
-        let ticks = Ticks {
-            period_ns: 125_000,
-            offset_ns: 7,
-        };
+        let ticks = Ticks { period_ns: 125_000, offset_ns: 7 };
         assert_eq!(ticks.at(8000 * 3600), 3600 * crate::SECOND + 7);
         assert_eq!(ticks.at(u64::MAX), Ns::MAX);
     }

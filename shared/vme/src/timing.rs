@@ -104,6 +104,8 @@ pub struct Counters {
     pub bus_errors: u32,
     /// Requests given up by the access timer.
     pub access_timeouts: u32,
+    /// Of these because an adaptor's link failed its parity check.
+    pub parity_errors: u32,
     /// Posted writes whose failure arrived late.
     pub posted_errors: u32,
     /// Interrupts taken up by a processor.
@@ -159,26 +161,15 @@ impl Timing {
                 FaultKind::Starvation(m) => ("master", m, wiring.masters.len()),
                 FaultKind::StuckBus => continue,
                 FaultKind::LostInterrupt(i) => ("interrupter", i, rack.interrupters.len()),
-                FaultKind::CableOut(a) => ("adaptor", a, rack.adaptors.len()),
-                FaultKind::Slow { task, .. } | FaultKind::Halt(task) => {
-                    ("task", task, rack.tasks.len())
-                }
+                FaultKind::CableOut(a) | FaultKind::Parity(a) => ("adaptor", a, rack.adaptors.len()),
+                FaultKind::Slow { task, .. } | FaultKind::Halt(task) => ("task", task, rack.tasks.len()),
             };
             if usize::from(index) >= n {
-                return Err(RackError::Unknown {
-                    party: format!("fault {i}"),
-                    kind,
-                    name: format!("number {index}"),
-                });
+                return Err(RackError::Unknown { party: format!("fault {i}"), kind, name: format!("number {index}") });
             }
         }
         let mut fault_times: Vec<_> = (faults.faults.iter().enumerate())
-            .flat_map(|(i, fault)| {
-                [
-                    (fault.from_ns, i as u16, true),
-                    (fault.until_ns, i as u16, false),
-                ]
-            })
+            .flat_map(|(i, fault)| [(fault.from_ns, i as u16, true), (fault.until_ns, i as u16, false)])
             .collect();
         fault_times.sort_by_key(|&(at, i, begins)| (at, begins, i));
 
@@ -192,20 +183,11 @@ impl Timing {
             }
         }
         for (i, interrupter) in rack.interrupters.iter().enumerate() {
-            agenda.set(
-                wiring.interrupter(i as u16),
-                interrupter.ticks.map_or(Ns::MAX, |ticks| ticks.at(0)),
-            );
+            agenda.set(wiring.interrupter(i as u16), interrupter.ticks.map_or(Ns::MAX, |ticks| ticks.at(0)));
         }
         let generators: Vec<Generator> = (rack.traffic.iter().enumerate())
             .map(|(g, t)| Generator {
-                arrivals: ArrivalStream::new(
-                    t.arrivals,
-                    t.period_ns as f64,
-                    t.offset_ns,
-                    t.seed,
-                    g as u64,
-                ),
+                arrivals: ArrivalStream::new(t.arrivals, t.period_ns as f64, t.offset_ns, t.seed, g as u64),
                 count: 0,
                 set_up: false,
             })
@@ -215,21 +197,12 @@ impl Timing {
         }
         Ok(Timing {
             arbiter: Arbiter::new(rack.bus.arbiter),
-            bus: bus::Bus {
-                owner: None,
-                phase: bus::Phase::Free,
-            },
+            bus: bus::Bus { owner: None, phase: bus::Phase::Free },
             masters: (wiring.masters.iter())
-                .map(|m| Requester {
-                    place: m.place,
-                    release: m.release,
-                    queue: Vec::new(),
-                })
+                .map(|m| Requester { place: m.place, release: m.release, queue: Vec::new() })
                 .collect(),
             processors: vec![processor::Processor::new(); rack.processors.len()],
-            tasks: (rack.tasks.iter().enumerate())
-                .map(|(t, task)| task::Task::new(t as u16, &task.release))
-                .collect(),
+            tasks: (rack.tasks.iter().enumerate()).map(|(t, task)| task::Task::new(t as u16, &task.release)).collect(),
             lines: vec![Line::default(); rack.interrupters.len()],
             generators,
             counters: Counters::default(),
@@ -270,10 +243,7 @@ impl Timing {
     /// Name of a master on the bus. Masters count processor cards first, then adaptors, then
     /// generators of traffic; those that work through an adaptor are not counted.
     pub fn master_name(&self, master: u16) -> Option<&str> {
-        self.wiring
-            .masters
-            .get(master as usize)
-            .map(|m| m.name.as_str())
+        self.wiring.masters.get(master as usize).map(|m| m.name.as_str())
     }
 
     /// Masters on the bus.
@@ -309,8 +279,7 @@ impl Timing {
                 let line = &mut self.lines[i as usize];
                 line.tick += 1;
                 let ticks = self.wiring.rack.interrupters[i as usize].ticks;
-                self.agenda
-                    .set(due, ticks.map_or(Ns::MAX, |ticks| ticks.at(line.tick)));
+                self.agenda.set(due, ticks.map_or(Ns::MAX, |ticks| ticks.at(line.tick)));
                 self.raise(i);
             }
             Source::Task(t) => return self.tick(t),

@@ -52,13 +52,7 @@ pub struct Traffic {
 impl Traffic {
     /// What each request asks for.
     pub fn access(&self) -> Access {
-        Access {
-            am: self.am,
-            addr: self.addr,
-            width: self.width,
-            dir: self.dir,
-            n: self.n,
-        }
+        Access { am: self.am, addr: self.addr, width: self.width, dir: self.dir, n: self.n }
     }
 }
 
@@ -87,23 +81,10 @@ pub struct ArrivalStream {
 
 impl ArrivalStream {
     /// A stream; `stream` keeps the numbers of several streams of one seed apart.
-    pub fn new(
-        arrivals: Arrivals,
-        period: f64,
-        offset: Ns,
-        seed: u64,
-        stream: u64,
-    ) -> ArrivalStream {
+    pub fn new(arrivals: Arrivals, period: f64, offset: Ns, seed: u64, stream: u64) -> ArrivalStream {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(stream);
-        let mut arrival = ArrivalStream {
-            arrivals,
-            period,
-            offset,
-            count: 0,
-            next: offset,
-            random,
-        };
+        let mut arrival = ArrivalStream { arrivals, period, offset, count: 0, next: offset, random };
         if arrivals == Arrivals::Poisson {
             arrival.advance();
         }
@@ -120,12 +101,9 @@ impl ArrivalStream {
         self.next = match self.arrivals {
             Arrivals::Periodic => {
                 self.count += 1;
-                self.offset
-                    .saturating_add((self.count as f64 * self.period + 0.5) as Ns)
+                self.offset.saturating_add((self.count as f64 * self.period + 0.5) as Ns)
             }
-            Arrivals::Poisson => self
-                .next
-                .saturating_add(exponential(&mut self.random, self.period)),
+            Arrivals::Poisson => self.next.saturating_add(exponential(&mut self.random, self.period)),
         };
     }
 }

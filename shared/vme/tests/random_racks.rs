@@ -42,11 +42,7 @@ impl Draw {
     }
 }
 
-const POLICIES: [ReleasePolicy; 3] = [
-    ReleasePolicy::WhenDone,
-    ReleasePolicy::OnRequest,
-    ReleasePolicy::OnBclr,
-];
+const POLICIES: [ReleasePolicy; 3] = [ReleasePolicy::WhenDone, ReleasePolicy::OnRequest, ReleasePolicy::OnBclr];
 
 /// A rack of up to three cards with up to four tasks, interrupts and traffic, and its programs.
 fn random_rack(draw: &mut Draw) -> (Rack, Vec<Vec<Op>>) {
@@ -102,45 +98,26 @@ fn random_rack(draw: &mut Draw) -> (Rack, Vec<Vec<Op>>) {
                 card: "board-0".into(),
                 level: draw.from(1, 8) as u8,
                 status_id: i as u8,
-                release: draw.pick(&[
-                    IrqRelease::Roak,
-                    IrqRelease::Rora {
-                        am: 0x39,
-                        addr: 0x1_0000,
-                        width: Width::D16,
-                    },
-                ]),
+                release: draw
+                    .pick(&[IrqRelease::Roak, IrqRelease::Rora { am: 0x39, addr: 0x1_0000, width: Width::D16 }]),
                 answer_ns: draw.from(100, 500),
-                ticks: Some(Ticks {
-                    period_ns: task.period_ns,
-                    offset_ns: task.offset_ns,
-                }),
+                ticks: Some(Ticks { period_ns: task.period_ns, offset_ns: task.offset_ns }),
                 local: false,
             });
             task.release = Release::Interrupt(name);
         }
         rack.tasks.push(task);
-        programs.push(
-            (0..draw.from(0, 12))
-                .map(|_| random_op(draw, &rack))
-                .collect(),
-        );
+        programs.push((0..draw.from(0, 12)).map(|_| random_op(draw, &rack)).collect());
     }
     for i in 0..draw.from(0, 4) {
-        let Op::Access(access) = random_access(draw, &rack) else {
-            unreachable!()
-        };
+        let Op::Access(access) = random_access(draw, &rack) else { unreachable!() };
         rack.traffic.push(Traffic {
             name: format!("traffic-{i}"),
             slot: Some(slot()),
             level: level(draw),
             release: draw.pick(&POLICIES),
             adaptor: None,
-            arrivals: if draw.chance(15) {
-                Arrivals::Poisson
-            } else {
-                Arrivals::Periodic
-            },
+            arrivals: if draw.chance(15) { Arrivals::Poisson } else { Arrivals::Periodic },
             period_ns: draw.from(20_000, 300_000),
             offset_ns: draw.from(0, 20_000),
             am: access.am,
@@ -155,11 +132,7 @@ fn random_rack(draw: &mut Draw) -> (Rack, Vec<Vec<Op>>) {
 }
 
 fn random_op(draw: &mut Draw, rack: &Rack) -> Op {
-    if draw.chance(40) {
-        Op::Exec(draw.from(0, 8_000))
-    } else {
-        random_access(draw, rack)
-    }
+    if draw.chance(40) { Op::Exec(draw.from(0, 8_000)) } else { random_access(draw, rack) }
 }
 
 fn random_access(draw: &mut Draw, rack: &Rack) -> Op {
@@ -173,13 +146,7 @@ fn random_access(draw: &mut Draw, rack: &Rack) -> Op {
         _ => (0x39, 1),
     };
     let addr = base + 4 * draw.from(0, 64) as u32;
-    Op::Access(Access {
-        am,
-        addr,
-        width,
-        dir: draw.pick(&[Direction::Read, Direction::Write]),
-        n,
-    })
+    Op::Access(Access { am, addr, width, dir: draw.pick(&[Direction::Read, Direction::Write]), n })
 }
 
 fn run(timing: &mut Timing, programs: &[Vec<Op>], limit: Ns) -> Log {
@@ -201,11 +168,7 @@ fn no_time_exceeds_its_bound(seed: u64) -> (usize, usize) {
     let (mut compared, mut free) = (0, 0);
     let mut compare = |bound: Option<Ns>, observed: Ns, what: &dyn std::fmt::Debug| match bound {
         Some(bound) => {
-            assert!(
-                observed <= bound,
-                "seed {seed}: {observed} > {bound}: {what:?}\n{:#?}",
-                timing.rack()
-            );
+            assert!(observed <= bound, "seed {seed}: {observed} > {bound}: {what:?}\n{:#?}", timing.rack());
             compared += 1;
         }
         None => free += 1,
@@ -216,18 +179,10 @@ fn no_time_exceeds_its_bound(seed: u64) -> (usize, usize) {
             Origin::Traffic => &bounds.traffic,
             _ => continue,
         };
-        compare(
-            list[transfer.task as usize],
-            transfer.done - transfer.requested,
-            transfer,
-        );
+        compare(list[transfer.task as usize], transfer.done - transfer.requested, transfer);
     }
     for job in &log.jobs {
-        compare(
-            bounds.response[job.task as usize],
-            job.end - job.release,
-            job,
-        );
+        compare(bounds.response[job.task as usize], job.end - job.release, job);
     }
     (compared, free)
 }
@@ -242,10 +197,7 @@ fn no_observed_time_exceeds_its_bound_in_random_racks() {
         free += f;
     }
     // the bounds say something: most times have one
-    assert!(
-        compared > free,
-        "{compared} compared, {free} without a bound"
-    );
+    assert!(compared > free, "{compared} compared, {free} without a bound");
 }
 
 #[test]
@@ -279,48 +231,28 @@ fn every_request_ends_once_the_bus_has_one_owner_and_time_goes_forward() {
         let mut timing = Timing::new(rack).unwrap();
         let log = run(&mut timing, &programs, 4_000_000);
 
-        let in_order = log
-            .transfers
-            .windows(2)
-            .all(|pair| pair[0].data_at <= pair[1].data_at);
+        let in_order = log.transfers.windows(2).all(|pair| pair[0].data_at <= pair[1].data_at);
         assert!(in_order, "seed {seed}");
         for t in &log.transfers {
-            assert!(
-                t.requested <= t.granted && t.granted <= t.data_at && t.data_at <= t.done,
-                "seed {seed}: {t:?}"
-            );
+            assert!(t.requested <= t.granted && t.granted <= t.data_at && t.data_at <= t.done, "seed {seed}: {t:?}");
         }
         // each job that ended has had each of its accesses end once, posted ones perhaps later
-        let mut ended: Vec<_> = log
-            .transfers
-            .iter()
-            .filter(|t| t.origin == Origin::Program)
-            .map(|t| (t.task, t.job, t.index))
-            .collect();
+        let mut ended: Vec<_> =
+            log.transfers.iter().filter(|t| t.origin == Origin::Program).map(|t| (t.task, t.job, t.index)).collect();
         let all = ended.len();
         ended.sort_unstable();
         ended.dedup();
         assert_eq!(ended.len(), all, "seed {seed}: an access ended twice");
         for job in log.jobs.iter().filter(|job| job.end < 3_000_000) {
-            let asked = programs[job.task as usize]
-                .iter()
-                .filter(|op| matches!(op, Op::Access(_)))
-                .count();
-            let seen = ended
-                .iter()
-                .filter(|e| (e.0, e.1) == (job.task, job.job))
-                .count();
+            let asked = programs[job.task as usize].iter().filter(|op| matches!(op, Op::Access(_))).count();
+            let seen = ended.iter().filter(|e| (e.0, e.1) == (job.task, job.job)).count();
             assert_eq!(seen, asked, "seed {seed}: {job:?}");
         }
         // never two owners: what each transfer held adds up to no more than the time, and tenures of
         // one burst are disjoint
         let mut held: Vec<(Ns, Ns)> = Vec::new();
         let mut sum = 0;
-        for t in log
-            .transfers
-            .iter()
-            .filter(|t| t.status != Status::AccessTimeout)
-        {
+        for t in log.transfers.iter().filter(|t| t.status != Status::AccessTimeout) {
             sum += t.held_ns;
             if t.access.n <= 1 {
                 held.push((t.done - t.held_ns, t.done));
@@ -400,8 +332,7 @@ fn random_set(draw: &mut Draw) -> Rack {
     for slave in &mut rack.slaves {
         slave.name = "memory".into();
     }
-    rack.traffic
-        .sort_by_key(|t| (std::cmp::Reverse(t.level), t.slot));
+    rack.traffic.sort_by_key(|t| (std::cmp::Reverse(t.level), t.slot));
     rack
 }
 
@@ -410,11 +341,7 @@ fn streams(rack: &Rack) -> Vec<Stream> {
         let slave = rack.slaves.iter().find(|s| s.base == t.addr).unwrap();
         300 + 30 * (Ns::from(t.slot.unwrap()) - 1) + 35 + slave.read_ns + 100
     };
-    let of = |t: &Traffic| Stream {
-        service_ns: service(t),
-        period_ns: t.period_ns,
-        jitter_ns: 0,
-    };
+    let of = |t: &Traffic| Stream { service_ns: service(t), period_ns: t.period_ns, jitter_ns: 0 };
     rack.traffic.iter().map(of).collect()
 }
 
@@ -424,9 +351,7 @@ fn the_critical_instant_reaches_the_bound(seed: u64) {
     let rack = random_set(&mut Draw::new(seed));
     let streams = streams(&rack);
     for i in 0..streams.len() {
-        let Some(bound) = sporadic(&streams, i) else {
-            panic!("seed {seed}: {i} has no bound")
-        };
+        let Some(bound) = sporadic(&streams, i) else { panic!("seed {seed}: {i} has no bound") };
         let mut rack = rack.clone();
         let blocker = (i + 1..streams.len()).max_by_key(|&k| streams[k].service_ns);
         rack.traffic = (0..streams.len())
@@ -442,15 +367,9 @@ fn the_critical_instant_reaches_the_bound(seed: u64) {
         let mut timing = Timing::new(rack).unwrap();
         // the level-i busy period is over by then: its demand fits
         let horizon = 200 * streams[..=i].iter().map(|s| s.period_ns).max().unwrap();
-        let mut worst = Worst {
-            task: i as u16,
-            response: 0,
-        };
+        let mut worst = Worst { task: i as u16, response: 0 };
         timing.advance(horizon, &mut worst);
-        assert_eq!(
-            worst.response, bound,
-            "seed {seed}, master {i}: {streams:?}"
-        );
+        assert_eq!(worst.response, bound, "seed {seed}, master {i}: {streams:?}");
     }
 }
 

@@ -74,7 +74,7 @@ impl Hold {
 impl Board for Hold {
     fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
         if inputs.boot {
-            out.program = Some((self.task, self.registers.until_decision()));
+            out.programs.push((self.task, self.registers.until_decision()));
         }
         for word in inputs.mail.words.iter().filter(|word| word.task == self.task) {
             if let Some(place) = self.words.get_mut(usize::from(word.index)) {

@@ -22,6 +22,8 @@ pub struct Rig {
     pub scenario: Scenario,
     pub board: ControlComputer,
     pub reads: Vec<Access>,
+    /// Task of the second card and its reads, where there is one.
+    pub second: Option<(u16, Vec<Access>)>,
     pub inputs: Inputs,
     pub out: Outputs,
     pub job: u32,
@@ -43,16 +45,20 @@ impl Rig {
         let mut out = Outputs::default();
         board.step(0, &inputs, &mut out);
         inputs.boot = false;
-        let (task, program) = out.program.take().unwrap();
+        let second = (out.programs.len() == 2).then(|| out.programs.pop().unwrap());
+        let (task, program) = out.programs.pop().unwrap();
         assert_eq!(Some(task), scenario.task_of("control_computer"));
-        let reads =
-            program.iter().filter_map(|op| if let Op::Access(access) = op { Some(*access) } else { None }).collect();
+        let accesses = |program: &Program| -> Vec<Access> {
+            program.iter().filter_map(|op| if let Op::Access(access) = op { Some(*access) } else { None }).collect()
+        };
+        let reads = accesses(&program);
         assert_eq!(program.last(), Some(&Op::Decide));
         Rig {
             counts: std::array::from_fn(|i| (posture[i] * drives[i]).floor() as i32),
             scenario,
             board,
             reads,
+            second: second.map(|(task, program)| (task, accesses(&program))),
             inputs,
             out,
             job: 0,
@@ -97,25 +103,36 @@ impl Rig {
 
     /// The cards' answers to the job's reads.
     pub fn answer(&mut self) {
+        let reads = std::mem::take(&mut self.reads);
+        self.answer_to(self.task(), &reads, self.job, self.now());
+        self.reads = reads;
+    }
+
+    /// The cards' answers to these reads of a job that decides at `now`.
+    fn answer_to(&mut self, task: u16, reads: &[Access], job: u32, now: Ns) {
         self.out.clear();
-        let now = self.now();
-        for index in 0..self.reads.len() {
-            let addr = self.reads[index].addr;
-            if !self.failing.contains(&addr) {
-                let word = BusWord {
-                    t: now - 1000,
-                    addr,
-                    value: self.content(addr),
-                    job: self.job,
-                    task: self.task(),
-                    index: index as u16,
-                };
+        for (index, access) in (0..).zip(reads) {
+            let addr = access.addr;
+            // the control computer's own RAM is no card of the rig
+            let own = Some(addr & !0xFFFF) == self.scenario.card_base("cpu-2-dpram");
+            if !own && !self.failing.contains(&addr) {
+                let word = BusWord { t: now - 1000, addr, value: self.content(addr), job, task, index };
                 self.inputs.mail.words.push(word);
             }
         }
         self.inputs.from = self.inputs.until;
         self.inputs.until = now;
-        self.inputs.decision = Some(board::Decision { task: self.task(), job: self.job });
+        self.inputs.decision = Some(board::Decision { task, job });
+    }
+
+    /// Runs a job of the second card that decides at `now`; what it gave is in `out`.
+    pub fn run_second(&mut self, job: u32, now: Ns) {
+        let (task, reads) = self.second.clone().unwrap();
+        self.answer_to(task, &reads, job, now);
+        self.step();
+        self.inputs.decision = None;
+        self.inputs.mail.clear();
+        self.inputs.transfers.clear();
     }
 
     /// The board's step alone.

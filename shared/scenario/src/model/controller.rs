@@ -41,10 +41,31 @@ pub struct Controller {
     /// Kind of processor card: gives `execution_us` and `entry_us` where the scenario does not state them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub processor: Option<vme::processor::Preset>,
-    /// Processor time from the last read to the first D/A write.
+    /// Processor time from the last read to the first D/A write; to the hand-over, where two cards share the pipeline.
     pub execution_us: f64,
     /// Processor time from the release to the first read (interrupt and context switch).
     pub entry_us: f64,
+    /// The second of two cards that share the pipeline; the rack then has a second task of the control computer.
+    pub second_card: SecondCard,
+}
+
+/// The card that runs inverse dynamics, safety and D/A where two share the pipeline.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SecondCard {
+    /// Kind of processor card, where it is another one than the first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub processor: Option<vme::processor::Preset>,
+    /// Processor time from the last read to the first D/A write.
+    pub execution_us: f64,
+    /// Processor time from the release to the first read.
+    pub entry_us: f64,
+}
+
+impl Default for SecondCard {
+    fn default() -> Self {
+        SecondCard { processor: None, execution_us: 400.0, entry_us: 130.0 }
+    }
 }
 
 impl Default for Controller {
@@ -68,6 +89,7 @@ impl Default for Controller {
             processor: None,
             execution_us: 1500.0,
             entry_us: 130.0,
+            second_card: SecondCard::default(),
         }
     }
 }

@@ -20,16 +20,8 @@ pub(super) struct Agenda {
 impl Agenda {
     /// Nothing is due.
     pub fn new(wiring: &Wiring) -> Agenda {
-        let busy = [
-            Wiring::BUS..wiring.interrupter(0),
-            wiring.dispatch(0)..wiring.sources.len(),
-        ];
-        Agenda {
-            due: vec![Ns::MAX; wiring.sources.len()],
-            busy,
-            quiet: (Ns::MAX, 0),
-            known: false,
-        }
+        let busy = [Wiring::BUS..wiring.interrupter(0), wiring.dispatch(0)..wiring.sources.len()];
+        Agenda { due: vec![Ns::MAX; wiring.sources.len()], busy, quiet: (Ns::MAX, 0), known: false }
     }
 
     /// The source has its next event at this instant; [`Ns::MAX`] for never.
@@ -49,12 +41,8 @@ impl Agenda {
     pub fn next(&mut self) -> (Ns, usize) {
         if !self.known {
             let all = self.due.iter().enumerate();
-            let quiet =
-                all.filter(|(source, _)| !self.busy.iter().any(|busy| busy.contains(source)));
-            self.quiet = quiet
-                .map(|(source, &at)| (at, source))
-                .min()
-                .unwrap_or((Ns::MAX, 0));
+            let quiet = all.filter(|(source, _)| !self.busy.iter().any(|busy| busy.contains(source)));
+            self.quiet = quiet.map(|(source, &at)| (at, source)).min().unwrap_or((Ns::MAX, 0));
             self.known = true;
         }
         let mut next = self.quiet;
@@ -71,11 +59,7 @@ impl Agenda {
 
 impl Clone for Agenda {
     fn clone(&self) -> Self {
-        Agenda {
-            due: self.due.clone(),
-            busy: self.busy.clone(),
-            ..*self
-        }
+        Agenda { due: self.due.clone(), busy: self.busy.clone(), ..*self }
     }
     fn clone_from(&mut self, from: &Self) {
         self.due.clone_from(&from.due);
@@ -91,29 +75,14 @@ mod tests {
     #[test]
     fn the_next_event_is_the_least_of_all_whatever_changed_before() {
         let n = 12;
-        let mut agenda = Agenda {
-            due: vec![Ns::MAX; n],
-            busy: [1..3, 9..12],
-            quiet: (Ns::MAX, 0),
-            known: false,
-        };
+        let mut agenda = Agenda { due: vec![Ns::MAX; n], busy: [1..3, 9..12], quiet: (Ns::MAX, 0), known: false };
         let mut state = 1u64;
         for _ in 0..10_000 {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            let at = if state >> 63 == 0 {
-                Ns::MAX
-            } else {
-                (state >> 40) % 16
-            };
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let at = if state >> 63 == 0 { Ns::MAX } else { (state >> 40) % 16 };
             agenda.set((state >> 33) as usize % n, at);
             let due = agenda.due.clone();
-            let least = due
-                .iter()
-                .enumerate()
-                .map(|(source, &at)| (at, source))
-                .min();
+            let least = due.iter().enumerate().map(|(source, &at)| (at, source)).min();
             assert_eq!(Some(agenda.next()), least);
         }
     }

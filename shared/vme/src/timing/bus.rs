@@ -31,22 +31,8 @@ pub(super) struct Bus {
 
 /// An access of processor or generator, before the bus has seen it.
 pub(super) fn pending(transfer: Transfer, client: Client, pace_ns: Ns) -> Pending {
-    let plan = Plan {
-        slave: None,
-        good: 0,
-        fails: true,
-        bytes: 1,
-        answer_ns: 0,
-        block: false,
-    };
-    Pending {
-        transfer,
-        client,
-        plan,
-        cycles_done: 0,
-        begun: false,
-        pace_ns,
-    }
+    let plan = Plan { slave: None, good: 0, fails: true, bytes: 1, answer_ns: 0, block: false };
+    Pending { transfer, client, plan, cycles_done: 0, begun: false, pace_ns }
 }
 
 /// A transfer that has been asked for and nothing more.
@@ -72,13 +58,7 @@ pub(super) fn asked(origin: Origin, task: u16, master: u16, access: Access, now:
 
 /// The interrupt acknowledge cycle of this level.
 pub(super) fn iack(level: u8) -> Access {
-    Access {
-        am: 0,
-        addr: u32::from(level) << 1,
-        width: Width::D8,
-        dir: Direction::Read,
-        n: 1,
-    }
+    Access { am: 0, addr: u32::from(level) << 1, width: Width::D8, dir: Direction::Read, n: 1 }
 }
 
 impl Timing {
@@ -95,16 +75,8 @@ impl Timing {
     /// Drives BR* for the first transfer of the queue.
     fn ask(&mut self, m: u16) {
         let timer = self.wiring.access_timer(m);
-        self.agenda.set(
-            timer,
-            self.now
-                .saturating_add(self.wiring.rack.bus.access_timer_ns),
-        );
-        if self
-            .faults
-            .holds(self.now, FaultKind::Starvation(m))
-            .is_none()
-        {
+        self.agenda.set(timer, self.now.saturating_add(self.wiring.rack.bus.access_timer_ns));
+        if self.faults.holds(self.now, FaultKind::Starvation(m)).is_none() {
             self.arbiter.request(self.masters[m as usize].place);
             self.wake_arbiter();
         }
@@ -169,23 +141,13 @@ impl Timing {
             head.transfer.slave = plan.slave;
         }
         let head = &mut self.masters[m as usize].queue[0];
-        let burst = head.plan.burst(
-            &self.wiring.rack.bus,
-            head.transfer.access.addr,
-            head.cycles_done,
-            head.pace_ns,
-        );
+        let burst = head.plan.burst(&self.wiring.rack.bus, head.transfer.access.addr, head.cycles_done, head.pace_ns);
         head.transfer.held_ns += granted + burst.done_ns - self.now;
         if burst.last {
-            self.bus.phase = Phase::Last {
-                done: granted + burst.done_ns,
-                status: burst.status,
-            };
+            self.bus.phase = Phase::Last { done: granted + burst.done_ns, status: burst.status };
             self.agenda.set(Wiring::BUS, granted + burst.data_ns);
         } else {
-            self.bus.phase = Phase::Burst {
-                cycles: burst.cycles,
-            };
+            self.bus.phase = Phase::Burst { cycles: burst.cycles };
             self.agenda.set(Wiring::BUS, granted + burst.done_ns);
         }
     }
@@ -195,30 +157,16 @@ impl Timing {
         let transfer = &pending.transfer;
         if transfer.origin == Origin::Iack {
             let answer_ns = self.acknowledge(pending);
-            return Plan {
-                slave: None,
-                good: 1,
-                fails: false,
-                bytes: 1,
-                answer_ns,
-                block: false,
-            };
+            return Plan { slave: None, good: 1, fails: false, bytes: 1, answer_ns, block: false };
         }
         let splits = match pending.client {
-            Client::Processor(p) | Client::WriteBuffer(p) => {
-                self.wiring.rack.processors[p as usize].splits_width
-            }
+            Client::Processor(p) | Client::WriteBuffer(p) => self.wiring.rack.processors[p as usize].splits_width,
             Client::Traffic(_) => false,
         };
         let mut plan = self.wiring.plan(&transfer.access, splits);
         if let Some(slave) = plan.slave.filter(|_| !transfer.access.is_address_only()) {
-            let dead = self
-                .faults
-                .holds(self.now, FaultKind::NoSlave(slave))
-                .is_some();
-            let cut = self.wiring.slaves[slave as usize]
-                .1
-                .is_some_and(|adaptor| !self.link_up(adaptor));
+            let dead = self.faults.holds(self.now, FaultKind::NoSlave(slave)).is_some();
+            let cut = self.wiring.slaves[slave as usize].1.is_some_and(|adaptor| !self.link_up(adaptor));
             if dead || cut {
                 plan.good = 0;
                 plan.fails = true;
@@ -227,13 +175,25 @@ impl Timing {
         plan
     }
 
+    /// Whether the owner's first transfer goes over a link that fails its parity check.
+    fn parity_fails(&self, owner: u16) -> bool {
+        if self.faults.faults.is_empty() {
+            return false;
+        }
+        let head = &self.masters[owner as usize].queue[0];
+        let carrier = match head.client {
+            Client::Processor(p) | Client::WriteBuffer(p) => self.wiring.processors[p as usize].1,
+            Client::Traffic(g) => self.wiring.traffic[g as usize].1,
+        };
+        let window = head.transfer.slave.and_then(|slave| self.wiring.slaves[slave as usize].1);
+        let fails = |adaptor: u16| self.faults.holds(self.now, FaultKind::Parity(adaptor)).is_some();
+        [carrier, window].into_iter().flatten().any(fails)
+    }
+
     /// Whether the adaptor's cable is plugged in.
-    pub(super) fn link_up(&self, adaptor: u16) -> bool {
+    pub fn link_up(&self, adaptor: u16) -> bool {
         self.wiring.rack.adaptors[adaptor as usize].link
-            && self
-                .faults
-                .holds(self.now, FaultKind::CableOut(adaptor))
-                .is_none()
+            && self.faults.holds(self.now, FaultKind::CableOut(adaptor)).is_none()
     }
 
     /// The IACK daisy chain finds the interrupter that answers; the time until it does.
@@ -248,9 +208,7 @@ impl Timing {
             .iter()
             .zip(&wiring.rack.interrupters)
             .enumerate()
-            .filter(|(i, (wire, spec))| {
-                lines[*i].pending && wire.handler == p && !wire.polled && !spec.local
-            })
+            .filter(|(i, (wire, spec))| lines[*i].pending && wire.handler == p && !wire.polled && !spec.local)
             .map(|(i, (wire, spec))| (i, spec.level, wire.slot));
         let Some(found) = interrupt::acknowledged(level, requests) else {
             return 0;
@@ -273,7 +231,11 @@ impl Timing {
                 self.bus.phase = Phase::Boundary;
                 self.wake_arbiter();
             }
-            Phase::Last { done, status } => {
+            Phase::Last { done, mut status } => {
+                if status == Status::Ok && self.parity_fails(owner) {
+                    status = Status::BusError;
+                    self.counters.parity_errors += 1;
+                }
                 let head = &mut self.masters[owner as usize].queue[0];
                 head.transfer.data_at = self.now;
                 head.transfer.done = done;
@@ -307,11 +269,7 @@ impl Timing {
             return;
         }
         let noticed = transfer.access.dir == Direction::Write || transfer.access.is_address_only();
-        if let Some(line) = transfer
-            .slave
-            .filter(|_| noticed)
-            .and_then(|slave| self.wiring.slaves[slave as usize].0)
-        {
+        if let Some(line) = transfer.slave.filter(|_| noticed).and_then(|slave| self.wiring.slaves[slave as usize].0) {
             self.raise(line);
         }
         let Client::Processor(p) = client else { return };
@@ -373,7 +331,7 @@ impl Timing {
             generator.set_up = false;
             pace_ns = spec.pace_ns(access.width.bytes());
             requested = self.now;
-            if !self.link_up(adaptor) {
+            if !self.link_up(adaptor) || !self.wiring.rack.adaptors[adaptor as usize].reaches(&access) {
                 let mut refused = asked(Origin::Traffic, g, master, access, self.now);
                 refused.status = Status::BusError;
                 self.counters.bus_errors += 1;

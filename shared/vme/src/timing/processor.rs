@@ -23,8 +23,8 @@ pub(super) enum Strand {
 pub(super) enum Stall {
     /// Its access is on its way out through the adaptor.
     Outbound(Pending),
-    /// Its adaptor refuses the access: the link is down.
-    Refused(Transfer),
+    /// Its access ends so without the bus: its adaptor refuses it, or latencies are constant.
+    Aside(Transfer),
     /// Its access waits for the bus or is on it.
     Access,
     /// Its access has ended so.
@@ -117,9 +117,9 @@ impl Timing {
                     self.enqueue(pending);
                     return;
                 }
-                Stall::Refused(mut transfer) => {
+                Stall::Aside(mut transfer) => {
                     (transfer.data_at, transfer.done) = (self.now, self.now);
-                    self.counters.bus_errors += 1;
+                    self.count_aside(&transfer);
                     sink.transfer(&transfer);
                     self.after_access(p, strand, transfer.status, since);
                 }
@@ -132,11 +132,7 @@ impl Timing {
         // a job that has nothing left to do ends before the releases of this instant
         if let Some(t) = self.processors[p as usize].loaded {
             let task = &self.tasks[t as usize];
-            if task.state == State::Active
-                && task.started
-                && task.remaining == 0
-                && task.operation().is_none()
-            {
+            if task.state == State::Active && task.started && task.remaining == 0 && task.operation().is_none() {
                 self.finish(t, sink);
             }
         }
@@ -196,10 +192,7 @@ impl Timing {
             return Some(Strand::Service);
         }
         let tasks = &self.wiring.tasks_of_processor[p as usize];
-        tasks
-            .iter()
-            .find(|&&t| self.tasks[t as usize].runnable())
-            .map(|&t| Strand::Task(t))
+        tasks.iter().find(|&&t| self.tasks[t as usize].runnable()).map(|&t| Strand::Task(t))
     }
 
     fn accept_interrupt(&mut self, p: u16) {
@@ -208,24 +201,14 @@ impl Timing {
         let latency = wiring.rack.processors[p as usize].interrupt_ns;
         if processor.posted_errors > 0 {
             processor.posted_errors -= 1;
-            processor.service = Some(Service {
-                line: None,
-                step: Step::Latency,
-                remaining: latency,
-                event: 0,
-            });
+            processor.service = Some(Service { line: None, step: Step::Latency, remaining: latency, event: 0 });
             return;
         }
         if processor.requests == 0 {
             return;
         }
         let waiting = (0..wiring.irqs.len()).filter(|i| processor.requests & (1 << i) != 0);
-        let urgent = |i: &usize| {
-            (
-                wiring.rack.interrupters[*i].level,
-                std::cmp::Reverse(wiring.irqs[*i].slot),
-            )
-        };
+        let urgent = |i: &usize| (wiring.rack.interrupters[*i].level, std::cmp::Reverse(wiring.irqs[*i].slot));
         let Some(found) = waiting.max_by_key(urgent) else {
             return;
         };
@@ -235,19 +218,9 @@ impl Timing {
             processor.requests &= !(1 << found);
             let event = self.lines[found].event;
             self.lines[found].pending = false;
-            Some(Service {
-                line: Some(found as u16),
-                step: Step::Latency,
-                remaining: latency,
-                event,
-            })
+            Some(Service { line: Some(found as u16), step: Step::Latency, remaining: latency, event })
         } else {
-            Some(Service {
-                line: None,
-                step: Step::Acknowledge(spec.level),
-                remaining: 0,
-                event: 0,
-            })
+            Some(Service { line: None, step: Step::Acknowledge(spec.level), remaining: 0, event: 0 })
         };
     }
 
@@ -271,19 +244,10 @@ impl Timing {
                 Next::Waits
             }
             Step::Latency => {
-                let release = service
-                    .line
-                    .map(|line| self.wiring.rack.interrupters[line as usize].release);
+                let release = service.line.map(|line| self.wiring.rack.interrupters[line as usize].release);
                 if let Some(IrqRelease::Rora { am, addr, width }) = release {
-                    let access = Access {
-                        am,
-                        addr,
-                        width,
-                        dir: Direction::Write,
-                        n: 1,
-                    };
-                    let transfer =
-                        asked(Origin::InterruptRelease, u16::MAX, master, access, self.now);
+                    let access = Access { am, addr, width, dir: Direction::Write, n: 1 };
+                    let transfer = asked(Origin::InterruptRelease, u16::MAX, master, access, self.now);
                     if let Some(service) = &mut self.processors[p as usize].service {
                         service.step = Step::Release;
                     }
@@ -339,11 +303,7 @@ impl Timing {
 
     /// An event of an interrupter.
     pub(super) fn raise(&mut self, i: u16) {
-        if self
-            .faults
-            .holds(self.now, crate::FaultKind::LostInterrupt(i))
-            .is_some()
-        {
+        if self.faults.holds(self.now, crate::FaultKind::LostInterrupt(i)).is_some() {
             self.lines[i as usize].events = self.lines[i as usize].events.wrapping_add(1);
             return;
         }
@@ -412,10 +372,7 @@ impl Timing {
             Op::Decide => {
                 task.record.decide = Some(self.now);
                 task.state = State::Deciding;
-                Next::Stops(Stop::Decision {
-                    task: t,
-                    job: task.job,
-                })
+                Next::Stops(Stop::Decision { task: t, job: task.job })
             }
         }
     }
@@ -424,9 +381,7 @@ impl Timing {
     fn access(&mut self, p: u16, t: u16, access: Access, sink: &mut impl Sink) -> Next {
         let master = self.wiring.processors[p as usize].0;
         let spec = &self.wiring.rack.processors[p as usize];
-        let posted = spec
-            .posted_write_ns
-            .filter(|_| access.dir == Direction::Write);
+        let posted = spec.posted_write_ns.filter(|_| access.dir == Direction::Write);
         let task = &mut self.tasks[t as usize];
         if posted.is_some() && self.processors[p as usize].buffer_full {
             task.pc -= 1;
@@ -439,6 +394,9 @@ impl Timing {
         if task.record.first_request.is_none() {
             task.record.first_request = Some(self.now);
             task.record.entry_ns = task.record.execution_ns;
+        }
+        if let Some(constant_ns) = self.wiring.rack.bus.constant_ns {
+            return self.aside(p, t, transfer, constant_ns, sink);
         }
         let Some(accepted_ns) = posted else {
             if self.pass(p, t, &mut transfer) {
@@ -453,6 +411,36 @@ impl Timing {
         self.processors[p as usize].buffer_full = true;
         self.enqueue(pending(transfer, Client::WriteBuffer(p), 0));
         Next::Goes
+    }
+
+    /// An access where latencies are constant: it is in nobody's way.
+    fn aside(&mut self, p: u16, t: u16, mut transfer: Transfer, constant_ns: Ns, sink: &mut impl Sink) -> Next {
+        transfer.slave = self.wiring.slave(&transfer.access);
+        if transfer.slave.is_none() && !transfer.access.is_address_only() {
+            transfer.status = Status::BusError;
+        }
+        let ends = self.now + constant_ns;
+        if ends >= self.limit.min(self.agenda.next().0) {
+            self.stall(p, Strand::Task(t), Stall::Aside(transfer));
+            let due = self.wiring.processor(p);
+            self.agenda.set(due, ends);
+            return Next::Waits;
+        }
+        self.now = ends;
+        (transfer.data_at, transfer.done) = (ends, ends);
+        self.count_aside(&transfer);
+        let task = &mut self.tasks[t as usize];
+        task.attempt = 0;
+        task.record.stalled_ns += constant_ns;
+        sink.transfer(&transfer);
+        Next::Goes
+    }
+
+    fn count_aside(&mut self, transfer: &Transfer) {
+        self.counters.bus_errors += u32::from(transfer.status == Status::BusError);
+        if transfer.origin == Origin::Program {
+            self.tasks[transfer.task as usize].record.last_data = Some(transfer.data_at);
+        }
     }
 
     /// The short way of the usual case: the processor's master has kept the bus, nobody else asks and
@@ -472,18 +460,10 @@ impl Timing {
             return false;
         }
         let rack = &self.wiring.rack;
-        let plan = self
-            .wiring
-            .plan(&transfer.access, rack.processors[p as usize].splits_width);
+        let plan = self.wiring.plan(&transfer.access, rack.processors[p as usize].splits_width);
         let burst = plan.burst(&rack.bus, transfer.access.addr, 0, 0);
-        let linked = plan
-            .slave
-            .is_none_or(|slave| self.wiring.slaves[slave as usize] != (None, None));
-        let stall_ns = if transfer.access.awaits_data() {
-            rack.bus.read_stall_ns
-        } else {
-            0
-        };
+        let linked = plan.slave.is_none_or(|slave| self.wiring.slaves[slave as usize] != (None, None));
+        let stall_ns = if transfer.access.awaits_data() { rack.bus.read_stall_ns } else { 0 };
         let goes_on = self.now + burst.done_ns + stall_ns;
         if !burst.last || plan.fails || linked || goes_on >= self.limit.min(self.agenda.next().0) {
             return false;
@@ -509,25 +489,14 @@ impl Timing {
         };
         let spec = &self.wiring.rack.adaptors[adaptor as usize];
         let block = transfer.access.n > 1;
-        let (stall, after) = if self.link_up(adaptor) {
-            let pace_ns = if block {
-                spec.pace_ns(transfer.access.width.bytes())
-            } else {
-                0
-            };
-            let out_ns = if block {
-                spec.dma_setup_ns
-            } else {
-                link_ns(spec, &transfer).0
-            };
+        let (stall, after) = if self.link_up(adaptor) && spec.reaches(&transfer.access) {
+            let pace_ns = if block { spec.pace_ns(transfer.access.width.bytes()) } else { 0 };
+            let out_ns = if block { spec.dma_setup_ns } else { link_ns(spec, &transfer).0 };
             transfer.requested = self.now + out_ns;
-            (
-                Stall::Outbound(pending(transfer, Client::Processor(p), pace_ns)),
-                out_ns,
-            )
+            (Stall::Outbound(pending(transfer, Client::Processor(p), pace_ns)), out_ns)
         } else {
             transfer.status = Status::BusError;
-            (Stall::Refused(transfer), spec.link_timeout_ns)
+            (Stall::Aside(transfer), spec.link_timeout_ns)
         };
         self.stall(p, strand, stall);
         let due = self.wiring.processor(p);
@@ -536,11 +505,7 @@ impl Timing {
 
     /// The bus has done with the access that stalls this processor.
     pub(super) fn access_ended(&mut self, p: u16, transfer: &Transfer) {
-        let mut stall_ns = if transfer.access.awaits_data() {
-            self.wiring.rack.bus.read_stall_ns
-        } else {
-            0
-        };
+        let mut stall_ns = if transfer.access.awaits_data() { self.wiring.rack.bus.read_stall_ns } else { 0 };
         if let Some(adaptor) = self.wiring.processors[p as usize].1 {
             stall_ns = link_ns(&self.wiring.rack.adaptors[adaptor as usize], transfer).1;
         }
@@ -620,32 +585,14 @@ impl Timing {
             self.start(t, event, self.now);
             return Next::Goes;
         }
-        task.state = State::Polling {
-            looked: !looked,
-            event: None,
-        };
+        task.state = State::Polling { looked: !looked, event: None };
         if looked && poll.interval_ns > 0 {
             task.remaining = poll.interval_ns;
             return Next::Goes;
         }
-        task.state = State::Polling {
-            looked: true,
-            event: None,
-        };
-        let access = Access {
-            am: poll.am,
-            addr: poll.addr,
-            width: poll.width,
-            dir: Direction::Read,
-            n: 1,
-        };
-        let transfer = asked(
-            Origin::Poll,
-            t,
-            self.wiring.processors[p as usize].0,
-            access,
-            self.now,
-        );
+        task.state = State::Polling { looked: true, event: None };
+        let access = Access { am: poll.am, addr: poll.addr, width: poll.width, dir: Direction::Read, n: 1 };
+        let transfer = asked(Origin::Poll, t, self.wiring.processors[p as usize].0, access, self.now);
         self.send_out(p, Strand::Task(t), transfer);
         Next::Waits
     }
@@ -668,10 +615,6 @@ impl Timing {
 
 /// Link time of a workstation's access on the way in and out.
 fn link_ns(spec: &crate::adaptor::Adaptor, transfer: &Transfer) -> (Ns, Ns) {
-    let both = if transfer.access.awaits_data() {
-        spec.link_read_ns
-    } else {
-        spec.link_write_ns
-    };
+    let both = if transfer.access.awaits_data() { spec.link_read_ns } else { spec.link_write_ns };
     (both / 2, both - both / 2)
 }

@@ -89,10 +89,7 @@ impl Task {
             pc: 0,
             remaining: 0,
             started: false,
-            record: JobRecord {
-                task,
-                ..JobRecord::default()
-            },
+            record: JobRecord { task, ..JobRecord::default() },
             tick: 0,
             backlog: Vec::new(),
             skipped: 0,
@@ -100,29 +97,19 @@ impl Task {
     }
 
     pub fn runnable(&self) -> bool {
-        matches!(
-            self.state,
-            State::Active | State::Deciding | State::Polling { .. }
-        )
+        matches!(self.state, State::Active | State::Deciding | State::Polling { .. })
     }
 
     /// The operation at hand.
     pub fn operation(&self) -> Option<Op> {
-        if self.decided {
-            self.rest.get(self.pc).copied()
-        } else {
-            self.program.get(self.pc).copied()
-        }
+        if self.decided { self.rest.get(self.pc).copied() } else { self.program.get(self.pc).copied() }
     }
 }
 
 /// What a task does between two jobs.
 fn rest_state(release: &Release) -> State {
     match release {
-        Release::Poll(_) => State::Polling {
-            looked: false,
-            event: None,
-        },
+        Release::Poll(_) => State::Polling { looked: false, event: None },
         Release::Timer | Release::Interrupt(_) => State::Idle,
     }
 }
@@ -139,25 +126,13 @@ impl Clone for Task {
     }
     // keeps the programs' memory: the chassis copies the timing plane every window
     fn clone_from(&mut self, from: &Self) {
-        let (mut program, mut staged) = (
-            std::mem::take(&mut self.program),
-            std::mem::take(&mut self.staged),
-        );
-        let (mut rest, mut backlog) = (
-            std::mem::take(&mut self.rest),
-            std::mem::take(&mut self.backlog),
-        );
+        let (mut program, mut staged) = (std::mem::take(&mut self.program), std::mem::take(&mut self.staged));
+        let (mut rest, mut backlog) = (std::mem::take(&mut self.rest), std::mem::take(&mut self.backlog));
         program.clone_from(&from.program);
         staged.clone_from(&from.staged);
         rest.clone_from(&from.rest);
         backlog.clone_from(&from.backlog);
-        *self = Task {
-            program,
-            staged,
-            rest,
-            backlog,
-            ..*from
-        };
+        *self = Task { program, staged, rest, backlog, ..*from };
     }
 }
 
@@ -174,10 +149,7 @@ impl Timing {
     /// stand at one (it was halted meanwhile) stays as it is.
     pub fn resume(&mut self, task: u16, rest: &[Op]) {
         let state = &mut self.tasks[task as usize];
-        debug_assert!(
-            matches!(state.state, State::Deciding | State::Halted),
-            "task {task} is not at a decision"
-        );
+        debug_assert!(matches!(state.state, State::Deciding | State::Halted), "task {task} is not at a decision");
         if state.state != State::Deciding {
             return;
         }
@@ -201,8 +173,7 @@ impl Timing {
         let task = &mut self.tasks[t as usize];
         let job = task.tick as u32;
         task.tick += 1;
-        self.agenda
-            .set(due, self.wiring.ticks[t as usize].at(task.tick));
+        self.agenda.set(due, self.wiring.ticks[t as usize].at(task.tick));
         self.release_task(t, job)
     }
 
@@ -239,12 +210,7 @@ impl Timing {
         task.state = State::Active;
         (task.job, task.index, task.attempt, task.pc) = (job, 0, 0, 0);
         (task.decided, task.started) = (false, false);
-        task.record = JobRecord {
-            task: t,
-            job,
-            release,
-            ..JobRecord::default()
-        };
+        task.record = JobRecord { task: t, job, release, ..JobRecord::default() };
     }
 
     /// The job has no operation left.
@@ -264,12 +230,7 @@ impl Timing {
         let mut stop = None;
         let (at, i, begins) = self.fault_times[self.next_fault];
         self.next_fault += 1;
-        self.agenda.set(
-            super::Wiring::FAULT,
-            self.fault_times
-                .get(self.next_fault)
-                .map_or(Ns::MAX, |f| f.0),
-        );
+        self.agenda.set(super::Wiring::FAULT, self.fault_times.get(self.next_fault).map_or(Ns::MAX, |f| f.0));
         debug_assert_eq!(at, self.now);
         let kind = self.faults.faults[i as usize].kind;
         if begins {

@@ -61,6 +61,8 @@ pub(crate) struct Wiring {
     /// For each generator its master and adaptor.
     pub traffic: Vec<(u16, Option<u16>)>,
     pub irqs: Vec<IrqWire>,
+    /// For each slave its window: modifier of single cycles, first address, bytes.
+    windows: Vec<(u8, u32, u32)>,
     /// For each slave its location monitor's interrupter and its adaptor.
     pub slaves: Vec<(Option<u16>, Option<u16>)>,
     pub sources: Vec<Source>,
@@ -70,50 +72,26 @@ impl Wiring {
     pub fn new(rack: Rack) -> Result<Wiring, RackError> {
         let rack = rack.checked()?;
         let index = |found: Option<usize>| found.map(|i| i as u16);
-        let adaptor = |name: &Option<String>| {
-            index(
-                name.as_ref()
-                    .and_then(|n| rack.adaptors.iter().position(|a| a.name == *n)),
-            )
-        };
-        let interrupter =
-            |name: &str| index(rack.interrupters.iter().position(|i| i.name == *name));
+        let adaptor =
+            |name: &Option<String>| index(name.as_ref().and_then(|n| rack.adaptors.iter().position(|a| a.name == *n)));
+        let interrupter = |name: &str| index(rack.interrupters.iter().position(|i| i.name == *name));
 
         let mut masters = Vec::new();
         let mut add = |name: &str, level, slot: Option<u8>, release| {
-            let place = Place {
-                level,
-                slot: slot.unwrap_or(SLOTS),
-            };
-            masters.push(Master {
-                name: name.into(),
-                place,
-                release,
-            });
+            let place = Place { level, slot: slot.unwrap_or(SLOTS) };
+            masters.push(Master { name: name.into(), place, release });
             masters.len() as u16 - 1
         };
         let own: Vec<Option<u16>> = rack
             .processors
             .iter()
-            .map(|p| {
-                p.adaptor
-                    .is_none()
-                    .then(|| add(&p.name, p.level, p.slot, p.release))
-            })
+            .map(|p| p.adaptor.is_none().then(|| add(&p.name, p.level, p.slot, p.release)))
             .collect();
-        let adaptors: Vec<u16> = rack
-            .adaptors
-            .iter()
-            .map(|a| add(&a.name, a.level, Some(a.slot), a.release))
-            .collect();
+        let adaptors: Vec<u16> = rack.adaptors.iter().map(|a| add(&a.name, a.level, Some(a.slot), a.release)).collect();
         let generators: Vec<Option<u16>> = rack
             .traffic
             .iter()
-            .map(|t| {
-                t.adaptor
-                    .is_none()
-                    .then(|| add(&t.name, t.level, t.slot, t.release))
-            })
+            .map(|t| t.adaptor.is_none().then(|| add(&t.name, t.level, t.slot, t.release)))
             .collect();
         let mut master_in_slot = [u16::MAX; SLOTS as usize + 1];
         for (i, master) in masters.iter().enumerate() {
@@ -121,36 +99,19 @@ impl Wiring {
         }
         // the checks have made sure that whoever has no requester of its own names an adaptor
         let carried = |own: Option<u16>, adaptor: Option<u16>| {
-            (
-                own.or(adaptor.map(|a| adaptors[a as usize]))
-                    .unwrap_or_default(),
-                adaptor,
-            )
+            (own.or(adaptor.map(|a| adaptors[a as usize])).unwrap_or_default(), adaptor)
         };
-        let processors: Vec<_> = rack
-            .processors
-            .iter()
-            .zip(own)
-            .map(|(p, own)| carried(own, adaptor(&p.adaptor)))
-            .collect();
-        let traffic = rack
-            .traffic
-            .iter()
-            .zip(generators)
-            .map(|(t, own)| carried(own, adaptor(&t.adaptor)))
-            .collect();
+        let processors: Vec<_> =
+            rack.processors.iter().zip(own).map(|(p, own)| carried(own, adaptor(&p.adaptor))).collect();
+        let traffic = rack.traffic.iter().zip(generators).map(|(t, own)| carried(own, adaptor(&t.adaptor))).collect();
 
         let processor_index = |name: &str| rack.processors.iter().position(|p| p.name == *name);
-        let processor_of_task: Vec<u16> = rack
-            .tasks
-            .iter()
-            .map(|t| processor_index(&t.processor).unwrap_or_default() as u16)
-            .collect();
+        let processor_of_task: Vec<u16> =
+            rack.tasks.iter().map(|t| processor_index(&t.processor).unwrap_or_default() as u16).collect();
         let tasks_of_processor = (0..rack.processors.len())
             .map(|p| {
-                let mut tasks: Vec<u16> = (0..rack.tasks.len() as u16)
-                    .filter(|&t| processor_of_task[t as usize] == p as u16)
-                    .collect();
+                let mut tasks: Vec<u16> =
+                    (0..rack.tasks.len() as u16).filter(|&t| processor_of_task[t as usize] == p as u16).collect();
                 tasks.sort_by_key(|&t| (std::cmp::Reverse(rack.tasks[t as usize].priority), t));
                 tasks
             })
@@ -177,29 +138,16 @@ impl Wiring {
                 IrqWire {
                     handler: handler.unwrap_or_default() as u16,
                     slot: slots.iter().position(|s| s.as_ref() == Some(&spec.card)).unwrap_or(1) as u8,
-                    tasks: (0..rack.tasks.len() as u16).filter(|&t| released(&rack.tasks[t as usize].release)).collect(),
+                    tasks: (0..rack.tasks.len() as u16)
+                        .filter(|&t| released(&rack.tasks[t as usize].release))
+                        .collect(),
                     polled: polls.contains(&Some(i as u16)),
                 }
             })
             .collect();
-        let slaves = rack
-            .slaves
-            .iter()
-            .map(|s| {
-                (
-                    s.monitor.as_deref().and_then(interrupter),
-                    adaptor(&s.adaptor),
-                )
-            })
-            .collect();
-        let ticks = rack
-            .tasks
-            .iter()
-            .map(|t| Ticks {
-                period_ns: t.period_ns,
-                offset_ns: t.offset_ns,
-            })
-            .collect();
+        let slaves =
+            rack.slaves.iter().map(|s| (s.monitor.as_deref().and_then(interrupter), adaptor(&s.adaptor))).collect();
+        let ticks = rack.tasks.iter().map(|t| Ticks { period_ns: t.period_ns, offset_ns: t.offset_ns }).collect();
 
         let mut sources = vec![Source::Fault, Source::Bus];
         sources.extend((0..rack.processors.len() as u16).map(Source::Processor));
@@ -219,6 +167,7 @@ impl Wiring {
             ticks,
             traffic,
             irqs,
+            windows: rack.slaves.iter().map(|s| (cycle::single(s.am), s.base, s.size)).collect(),
             slaves,
             sources,
             rack,
@@ -252,11 +201,9 @@ impl Wiring {
 
     /// The window that an access meets.
     pub fn slave(&self, access: &Access) -> Option<u16> {
-        self.rack
-            .slaves
-            .iter()
-            .position(|slave| slave.answers(access))
-            .map(|i| i as u16)
+        let am = cycle::single(access.am);
+        let holds = |&(of, base, size): &(u8, u32, u32)| of == am && access.addr.wrapping_sub(base) < size;
+        self.windows.iter().position(holds).map(|i| i as u16)
     }
 
     /// Time from the arbiter's choice to the ownership of the bus in this slot.
@@ -266,9 +213,7 @@ impl Wiring {
 
     /// The plan of an access of a master that splits or does not.
     pub fn plan(&self, access: &Access, splits: bool) -> cycle::Plan {
-        let slave = self
-            .slave(access)
-            .map(|s| (s, &self.rack.slaves[s as usize]));
+        let slave = self.slave(access).map(|s| (s, &self.rack.slaves[s as usize]));
         cycle::plan(&self.rack.bus, access, slave, splits)
     }
 }

@@ -5,7 +5,8 @@ use report::BusAccount;
 use std::fmt::{self, Display, Write};
 use vme::analysis::{self, Bounds};
 use vme::cycle::address_bits;
-use vme::rack::{Rack, Release};
+use vme::rack::{Overrun, Rack, Release};
+use vme::traffic::Arrivals;
 use vme::{Access, Direction, Ns, Op, Program, RackError, Timing};
 
 /// All of it. `programs[t]` is what task `t` does in its longest job; a task without an entry is shown
@@ -32,7 +33,7 @@ fn drawing(out: &mut String, rack: &Rack) -> fmt::Result {
     let slots = rack.slots().unwrap_or_default();
     let height = slots.iter().flatten().map(|name| name.chars().count()).max().unwrap_or(0);
     let border: String = slots[1..].iter().map(|_| "+---").collect::<String>() + "+";
-    writeln!(out, "Rack (arbiter {:?} in slot 1)\n", rack.bus.arbiter)?;
+    writeln!(out, "Rack (arbiter {} in slot 1)\n", rack.bus.arbiter)?;
     writeln!(out, "{border}")?;
     let numbers: String = (1..slots.len()).map(|slot| format!("|{slot:>2} ")).collect();
     writeln!(out, "{numbers}|\n{border}")?;
@@ -47,8 +48,8 @@ fn drawing(out: &mut String, rack: &Rack) -> fmt::Result {
             .map(|p| p.name.as_str())
             .chain(rack.traffic.iter().filter(|t| t.adaptor.as_ref() == Some(&adaptor.name)).map(|t| t.name.as_str()))
             .collect();
-        let cable = if adaptor.link { "=====" } else { "== ==" };
-        writeln!(out, "slot {} {} {cable} {:?} {cable} {}", adaptor.slot, adaptor.name, adaptor.kind, beyond.join(", "))?;
+        let cable = if adaptor.link { "=====" } else { "== / ==" };
+        writeln!(out, "slot {} {} {cable} {} {cable} {}", adaptor.slot, adaptor.name, adaptor.kind, beyond.join(", "))?;
     }
     Ok(())
 }
@@ -64,7 +65,7 @@ fn memory_map(out: &mut String, rack: &Rack) -> fmt::Result {
         write!(out, "{bits:<4} {:>#10x} {last:>#10x} {:>4X} {:>5} {:>4} ", slave.base, slave.am, format!("{:?}", slave.width), slave.slot)?;
         write!(out, "{:>8} {:>8}  {}", slave.read_ns, slave.write_ns, slave.name)?;
         if let Some(adaptor) = &slave.adaptor {
-            write!(out, ", through {adaptor}")?;
+            write!(out, ", through {adaptor} to {:#x}", slave.remote_base.unwrap_or(slave.base))?;
         }
         if let Some(interrupter) = &slave.monitor {
             write!(out, ", a write raises {interrupter}")?;
@@ -81,17 +82,25 @@ fn masters(out: &mut String, rack: &Rack) -> fmt::Result {
             (Some(adaptor), _) => writeln!(out, "{} through {adaptor}", processor.name)?,
             (None, slot) => {
                 let slot = slot.map_or("?".into(), |slot| slot.to_string());
-                writeln!(out, "{}: slot {slot}, BR{}*, {:?}", processor.name, processor.level, processor.release)?;
+                writeln!(out, "{}: slot {slot}, BR{}*, {}", processor.name, processor.level, processor.release)?;
             }
         }
     }
     for adaptor in &rack.adaptors {
-        writeln!(out, "{}: slot {}, BR{}*, {:?}", adaptor.name, adaptor.slot, adaptor.level, adaptor.release)?;
+        writeln!(out, "{}: slot {}, BR{}*, {}", adaptor.name, adaptor.slot, adaptor.level, adaptor.release)?;
+        for map in &adaptor.maps {
+            let last = map.base + (map.size - 1);
+            writeln!(out, "  maps {:#x} to {last:#x} to {:#x} of the workstation's bus", map.base, map.remote_base)?;
+        }
     }
     for traffic in &rack.traffic {
-        write!(out, "{}: {:?} traffic every {} ns, ", traffic.name, traffic.arrivals, traffic.period_ns)?;
+        let arrivals = match traffic.arrivals {
+            Arrivals::Periodic => "traffic every",
+            Arrivals::Poisson => "Poisson traffic, on the average every",
+        };
+        write!(out, "{}: {arrivals} {} ns, ", traffic.name, traffic.period_ns)?;
         match (&traffic.adaptor, traffic.slot) {
-            (None, Some(slot)) => write!(out, "slot {slot}, BR{}*, {:?}: ", traffic.level, traffic.release)?,
+            (None, Some(slot)) => write!(out, "slot {slot}, BR{}*, {}: ", traffic.level, traffic.release)?,
             _ => write!(out, "through {}: ", traffic.adaptor.as_deref().unwrap_or("?"))?,
         }
         access(out, rack, &traffic.access())?;
@@ -111,7 +120,8 @@ fn tasks(
     observed: Option<&BusAccount>,
 ) -> fmt::Result {
     for (t, task) in rack.tasks.iter().enumerate() {
-        writeln!(out, "\nTask {} of {} on {}, priority {}, {}", task.name, task.board, task.processor, task.priority, released(task))?;
+        write!(out, "\nTask {} of {} on {}, priority {}, {}", task.name, task.board, task.processor, task.priority, released(task))?;
+        writeln!(out, "; an overrun {}", overrun(task.overrun))?;
         let Some(program) = programs.get(t) else {
             writeln!(out, "  (its board sets the program when it boots)")?;
             continue;
@@ -135,6 +145,14 @@ fn tasks(
         }
     }
     Ok(())
+}
+
+fn overrun(policy: Overrun) -> &'static str {
+    match policy {
+        Overrun::Skip => "skips the release",
+        Overrun::Late => "lets the job finish late",
+        Overrun::Trip => "trips the card",
+    }
 }
 
 fn released(task: &vme::rack::Task) -> impl Display + '_ {

@@ -1,0 +1,93 @@
+//! The end of the pipeline: safety state, what the drives are told, and the words that the D/A cards get.
+//!
+//! It runs on the card that writes the D/A converters: the only one, or the second of two.
+
+use crate::pipeline::Mode;
+use crate::program::{BusProgram, Rest};
+use crate::safety::{Safety, Signs, State};
+use arm::JointVector;
+use board::Outputs;
+use messages::{Event, EventKind, JOINTS, Severity};
+use scenario::Scenario;
+use vme::Ns;
+
+/// Safety, amplifiers and converters.
+pub struct Output {
+    safety: Safety,
+    converters: Converters,
+    /// What the last job did after its decision.
+    rest: Option<Rest>,
+    finite: bool,
+}
+
+/// D/A converters: from torque to code.
+struct Converters {
+    nm_per_v: JointVector,
+    bits: u32,
+}
+
+impl Converters {
+    /// Offset binary over ±10 V.
+    fn code(&self, joint: usize, torque: f64) -> u32 {
+        let half = 2f64.powi(self.bits as i32 - 1);
+        let steps = (torque / self.nm_per_v[joint] / 10.0 * half).round();
+        (steps + half).clamp(0.0, 2.0 * half - 1.0) as u32
+    }
+}
+
+impl Output {
+    /// Running, nothing told yet. The message says what is wrong with the drives.
+    pub fn new(scenario: &Scenario) -> Result<Output, String> {
+        let nm_per_v = scenario.drives()?.each(|drive| drive.amplifier_nm_per_v);
+        Ok(Output {
+            safety: Safety::new(&scenario.safety),
+            converters: Converters { nm_per_v, bits: scenario.da_io.bits.into() },
+            rest: None,
+            finite: true,
+        })
+    }
+
+    /// The state after a job at `t` of simulated time and `now` of the board's clock; the torques' finiteness is known here.
+    pub fn decide(&mut self, t: Ns, now: Ns, signs: &Signs, out: &mut Outputs) -> State {
+        let before = self.safety.state();
+        let state = self.safety.decide(now, &Signs { finite: self.finite, ..*signs });
+        if state != before {
+            let severity = match state {
+                State::Run => Severity::Ok,
+                State::Degraded | State::Hold => Severity::Warn,
+                State::Stop | State::Off => Severity::Error,
+            };
+            let (from, to) = (f64::from(before as u32), f64::from(state as u32));
+            out.mail.events.push(Event::new(t, EventKind::SafetyState, severity, from, to));
+        }
+        state
+    }
+
+    /// Tells the drives, with these torques; returns when the job will have computed.
+    pub fn write(
+        &mut self,
+        (task, job): (u16, u32),
+        t: Ns,
+        mode: Mode,
+        torque: &JointVector,
+        program: &BusProgram,
+        out: &mut Outputs,
+    ) -> Ns {
+        self.finite = torque.iter().all(|torque| torque.is_finite());
+        let rest = match self.rest {
+            _ if mode == Mode::Free || !self.finite => Rest::Stop,
+            None | Some(Rest::Stop) => Rest::Start,
+            _ => Rest::Run,
+        };
+        let codes: [u32; JOINTS] = std::array::from_fn(|joint| {
+            let torque = if rest == Rest::Stop { 0.0 } else { torque[joint] };
+            self.converters.code(joint, torque)
+        });
+        if self.rest != Some(rest) {
+            out.rest = Some(program.after_decision(rest));
+            self.rest = Some(rest);
+        }
+        program.words(rest, task, job, &codes, &mut out.mail.words);
+        t + program.execution_ns(rest)
+    }
+}

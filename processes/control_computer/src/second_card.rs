@@ -1,0 +1,140 @@
+//! The second of two cards: inverse dynamics, safety and D/A at a rate of its own, on what the first card has handed over.
+//!
+//! It reads encoders and drives' status afresh in every job. Without a block from the first card the drives stay off. A
+//! block that does not come in time counts as a value held, so a first card that overruns, or is gone, degrades the arm
+//! and then stops it.
+
+use crate::frame::TaskFrame;
+use crate::handover::{Ram, Word};
+use crate::inverse_dynamics::InverseDynamics;
+use crate::output::Output;
+use crate::pipeline::{BRAKING, Mode};
+use crate::program::{BusProgram, Part};
+use crate::safety::{Signs, State};
+use crate::sensors::Sensors;
+use arm::{ArmModel, ArmState, JointVector};
+use board::Outputs;
+use messages::{BusWord, Event, EventKind, Severity, TransferRecord};
+use scenario::Scenario;
+use vme::Ns;
+
+/// The second processor card.
+pub struct SecondCard {
+    task: u16,
+    /// Task of the first card and its period.
+    first: (u16, Ns),
+    program: BusProgram,
+    sensors: Sensors,
+    arm: ArmModel,
+    frame: TaskFrame,
+    inverse: InverseDynamics,
+    output: Output,
+    ram: Ram,
+    torque: JointVector,
+}
+
+impl SecondCard {
+    /// The card that runs `task`. The message says what is wrong with rack, arm or drives.
+    pub fn new(scenario: &Scenario, first: u16, task: u16) -> Result<SecondCard, String> {
+        let program = BusProgram::new(scenario, Part::Torque)?;
+        Ok(SecondCard {
+            task,
+            first: (first, scenario.rack.tasks[usize::from(first)].period_ns),
+            sensors: Sensors::new(scenario, program.sensors())?,
+            program,
+            arm: scenario.controller_arm()?,
+            frame: TaskFrame::new(&scenario.task_frame()),
+            inverse: InverseDynamics::new(scenario)?,
+            output: Output::new(scenario)?,
+            ram: Ram::new(),
+            torque: JointVector::zeros(),
+        })
+    }
+
+    /// Its dual-ported RAM.
+    pub fn ram(&mut self) -> &mut Ram {
+        &mut self.ram
+    }
+
+    /// Its task.
+    pub fn task(&self) -> u16 {
+        self.task
+    }
+
+    /// Torques sent last (Nm).
+    pub fn torque(&self) -> &JointVector {
+        &self.torque
+    }
+
+    /// Its program up to the decision.
+    pub fn program(&self) -> vme::Program {
+        self.program.until_decision()
+    }
+
+    /// The answer to one of its reads.
+    pub fn take(&mut self, word: &BusWord) {
+        self.sensors.take(word);
+    }
+
+    /// A transfer made to its RAM by the first card.
+    pub fn served(&mut self, transfer: &TransferRecord) {
+        let Some([block, state]) = self.program.second else { return };
+        if transfer.task != self.first.0 {
+            return;
+        }
+        if transfer.addr == block.addr && !transfer.is_read() {
+            self.ram.arrived(transfer.job, transfer.data_at, transfer.is_ok());
+        } else if transfer.addr == state.addr && transfer.is_read() && transfer.is_ok() {
+            self.ram.read_at(transfer.data_at);
+        }
+    }
+
+    /// One job at its decision, at `t` of simulated time and `now` of the board's clock.
+    pub fn job(&mut self, job: u32, t: Ns, now: Ns, out: &mut Outputs) {
+        if let Some(register) = self.sensors.read(job) {
+            let address = self.program.register_address(register).into();
+            out.mail.events.push(Event::new(t, EventKind::BusError, Severity::Warn, job.into(), address));
+        }
+        let sensed = *self.sensors.sensed();
+        let period = self.first.1;
+        let mut missing = 0;
+        let mut asked = (false, false);
+        let wanted = self.ram.block().map(|(at, wanted)| {
+            // blocks come a period apart, and may be late by half of one
+            let periods = (t.saturating_sub(*at) + period / 2) / period;
+            missing = wanted.held_jobs.max(periods.saturating_sub(1) as u32);
+            // a request counts once
+            asked = (std::mem::take(&mut wanted.hold), std::mem::take(&mut wanted.acknowledge));
+            *wanted
+        });
+        let signs = Signs {
+            drive_status: self.sensors.status(),
+            held_jobs: self.sensors.held_jobs().max(missing),
+            old_force_jobs: wanted.map_or(0, |wanted| wanted.old_force_jobs),
+            same_force_jobs: wanted.map_or(0, |wanted| wanted.same_force_jobs),
+            speed: sensed.qd.amax(),
+            finite: true,
+            hold: asked.0,
+            acknowledge: asked.1,
+        };
+        let state = self.output.decide(t, now, &signs, out);
+        let mode = match (state, &wanted) {
+            (State::Off, _) | (_, None) => Mode::Free,
+            (State::Stop, _) => Mode::Brake,
+            (State::Hold, _) => Mode::Hold,
+            _ => Mode::Law,
+        };
+        let mut torque_limited = 0;
+        self.torque = JointVector::zeros();
+        if let Some(mut wanted) = wanted.filter(|_| mode != Mode::Free) {
+            if mode == Mode::Brake {
+                wanted.qdd = sensed.qd * -BRAKING;
+            }
+            let arm = ArmState::new(&self.arm, &sensed.q, &sensed.qd);
+            let tool = self.frame.kinematics(&arm.tip_motion());
+            (self.torque, torque_limited) = self.inverse.torque(&arm, &tool, &wanted, mode);
+        }
+        let written = self.output.write((self.task, job), t, mode, &self.torque, &self.program, out);
+        self.ram.show(written, Word { state, torque_limited });
+    }
+}

@@ -157,7 +157,15 @@ pub(crate) fn charts(report: &RunReport) -> Vec<Chart> {
         }
     }
     // a picture of lines that are all flat and the same shows nothing
-    charts.retain(|chart| chart.tall || chart.lines.iter().any(|line| line.y.iter().flatten().any(|y| y.abs() > 1e-9)));
+    charts.retain(|chart| chart.lines.iter().any(|line| line.y.iter().flatten().any(|y| y.abs() > 1e-9)));
+    // where nothing is touched, the position is what it is about
+    let main = format!("Tool position along {axis}");
+    if !charts.iter().any(|chart| chart.tall)
+        && let Some(i) = charts.iter().position(|chart| chart.title == main)
+    {
+        charts[..=i].rotate_right(1);
+        charts[0].tall = true;
+    }
     charts
 }
 

@@ -8,6 +8,7 @@ use crate::chart::Chart;
 use crate::faults;
 use crate::path;
 use crate::result::{RunReport, VariantResult};
+use crate::segments::SegmentRow;
 use crate::svg;
 use crate::text::{
     CHECK_HEADINGS, HEADINGS, LATENCY_HEADINGS, check_row, latency_rows, segments, sweep_table, verdict,
@@ -143,12 +144,17 @@ fn cards(report: &RunReport) -> String {
     for (i, variant) in report.variants.iter().enumerate() {
         let judged = variant.checks.iter().filter(|check| check.passed.is_some());
         let held = judged.clone().filter(|check| check.passed == Some(true)).count();
-        let means: Vec<String> = variant
-            .segments
-            .iter()
-            .filter(|row| row.force_controlled)
-            .map(|row| row.mean_n.map_or_else(|| "–".into(), |mean| format!("{:.1}", mean + 0.0)))
-            .collect();
+        let cells = |figures: &dyn Fn(&SegmentRow) -> Option<String>| -> String {
+            let figures: Vec<String> = variant.segments.iter().filter_map(figures).collect();
+            figures.join(" <i>/</i> ")
+        };
+        let (figures, unit, what) = if variant.segments.iter().any(|row| row.force_controlled) {
+            let mean = |row: &SegmentRow| row.mean_n.map_or_else(|| "–".into(), |mean| format!("{:.1}", mean + 0.0));
+            (cells(&|row| row.force_controlled.then(|| mean(row))), "N", "mean force of each force segment's last second")
+        } else {
+            let off = |error: f64| format!("{:.1}", 1e3 * error);
+            (cells(&|row| row.position_error_m.map(off)), "mm", "off X_d at the end of each segment")
+        };
         let ended = match &variant.ended {
             Ended::Completed => format!("{held} of {} limits hold", judged.count()),
             Ended::Diverged { at_s } => format!("diverged at {at_s:.2} s"),
@@ -158,13 +164,12 @@ fn cards(report: &RunReport) -> String {
             variant.findings.iter().map(|finding| format!("<p class=finding>{}</p>", escape(finding))).collect();
         out += &format!(
             "<article class=card><h3><i class=swatch data-color=\"{}\"></i>{}<span class=\"pill {}\">{}</span></h3>\
-             <p class=big>{}<small>N</small></p><p class=note>mean force of each force segment's last second</p>\
+             <p class=big>{figures}<small>{unit}</small></p><p class=note>{what}</p>\
              <p>{ended}</p>{findings}</article>",
             i % 7,
             escape(&variant.name),
             class(variant.verdict),
             verdict(variant.verdict),
-            means.join(" <i>/</i> "),
         );
     }
     out

@@ -21,11 +21,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let (other, other_scenario) = &variants[1];
         let original = if factor > 0.0 { f64::NAN } else { 0.1 };
         [
-            SweepPoint::new(factor, &made_up::result(variant, scenario, 3.0 * factor)),
-            SweepPoint::new(factor, &made_up::result(other, other_scenario, original)),
+            SweepPoint::new(factor, None, &made_up::result(variant, scenario, 3.0 * factor)),
+            SweepPoint::new(factor, None, &made_up::result(other, other_scenario, original)),
         ]
     });
-    let sweep = Sweep { key: "plant.friction_scale".into(), points: points.collect() };
+    let sweep = Sweep { key: "plant.friction_scale".into(), across: None, points: points.collect() };
     let report = RunReport::new("table-5-3", &variants[0].1, "made up", results, vec![sweep]);
     report.write(folder.as_ref())?;
     print!("{}", report::text::render(&report));

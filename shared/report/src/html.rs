@@ -7,6 +7,7 @@ use crate::bus_rows::{
 use crate::chart::Chart;
 use crate::faults;
 use crate::path;
+use crate::region;
 use crate::result::{RunReport, VariantResult};
 use crate::segments::SegmentRow;
 use crate::svg;
@@ -207,8 +208,9 @@ fn sweeps(report: &RunReport) -> String {
         let (headings, rows) = sweep_table(sweep);
         let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
         out += &format!(
-            "<h2>Sweep of <code>{}</code></h2><p class=note>mean force of each segment's last second, N</p>{}",
+            "<h2>Sweep of <code>{}</code></h2>{}<p class=note>mean force of each segment's last second, N</p>{}",
             escape(&sweep.key),
+            region::draw(sweep),
             table(&headings, &rows)
         );
     }

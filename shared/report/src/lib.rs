@@ -17,6 +17,7 @@ pub mod latency;
 mod ledger;
 mod measures;
 mod path;
+mod region;
 mod result;
 mod segments;
 mod series;

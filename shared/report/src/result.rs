@@ -264,6 +264,8 @@ fn ideal_rows(
 pub struct Sweep {
     /// Key path.
     pub key: String,
+    /// Second key path, where two are varied.
+    pub across: Option<String>,
     /// One run each.
     pub points: Vec<SweepPoint>,
 }
@@ -273,6 +275,10 @@ pub struct Sweep {
 pub struct SweepPoint {
     /// Value of the key.
     pub value: f64,
+    /// Value of the second key.
+    pub across: Option<f64>,
+    /// Whether the run held the scenario's limits.
+    pub passed: bool,
     /// Variant.
     pub variant: String,
     /// How the run ended.
@@ -285,9 +291,11 @@ pub struct SweepPoint {
 
 impl SweepPoint {
     /// Sums a run up.
-    pub fn new(value: f64, result: &VariantResult) -> SweepPoint {
+    pub fn new(value: f64, across: Option<f64>, result: &VariantResult) -> SweepPoint {
         SweepPoint {
             value,
+            across,
+            passed: result.verdict == Verdict::Passed,
             variant: result.name.clone(),
             ended: result.ended.clone(),
             run: result.run.clone(),

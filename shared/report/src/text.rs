@@ -112,6 +112,9 @@ pub(crate) fn latency_rows(paths: &[PathLatency]) -> Vec<Vec<String>> {
 /// A sweep: one row per variant and value, one column per force segment.
 pub(crate) fn sweep_table(sweep: &Sweep) -> (Vec<String>, Vec<Vec<String>>) {
     let mut headings = vec!["variant".to_owned(), sweep.key.clone()];
+    if let Some(across) = &sweep.across {
+        headings.extend([across.clone(), "limits".into()]);
+    }
     let rows = sweep.points.first().map_or(&[][..], |point| &point.segments);
     headings.extend(rows.iter().filter(|row| row.force_controlled).map(|row| row.name.clone()));
     headings.extend(rows.iter().filter(|row| row.force_controlled).map(|row| format!("{} rms", row.name)));
@@ -123,6 +126,9 @@ pub(crate) fn sweep_table(sweep: &Sweep) -> (Vec<String>, Vec<Vec<String>>) {
         .into_iter()
         .map(|point| {
             let mut row = vec![point.variant.clone(), format!("{}", point.value)];
+            if let Some(across) = point.across {
+                row.extend([format!("{across}"), if point.passed { "hold" } else { "BROKEN" }.into()]);
+            }
             row.extend(point.segments.iter().filter(|row| row.force_controlled).map(|row| number(row.mean_n, 2)));
             let forces = point.segments.iter().filter(|row| row.force_controlled);
             row.extend(forces.map(|row| number(row.rms_error_n, 2)));

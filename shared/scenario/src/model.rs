@@ -203,8 +203,21 @@ pub struct ReportSweep {
     pub key: String,
     /// Values.
     pub values: Vec<f64>,
+    /// A second key, varied with the first: the report draws where the limits hold.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub across: Option<Across>,
     /// Variants that it is applied to.
     pub variants: Vec<String>,
+}
+
+/// The second key of a sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Across {
+    /// Key path.
+    pub key: String,
+    /// Values.
+    pub values: Vec<f64>,
 }
 
 fn one() -> u64 {

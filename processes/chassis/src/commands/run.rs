@@ -8,7 +8,7 @@ use crate::rack_run::{self, Finished, INTERRUPTED, Pacing, Setting};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, WrapErr, miette};
-use report::{RunReport, Sweep, SweepPoint, VariantResult, Verdict};
+use report::{RunReport, Sweep, SweepPoint, Verdict};
 use scenario::{Document, Scenario, Variant};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -199,25 +199,31 @@ fn settle_record(record: &Path, broken: bool) -> Result<String, String> {
 fn sweeps(document: &Document, variants: &[(Variant, Scenario)]) -> miette::Result<Vec<Sweep>> {
     let mut sweeps = Vec::new();
     for sweep in &document.scenario()?.report.sweeps {
+        let across: Vec<Option<f64>> =
+            sweep.across.as_ref().map_or(vec![None], |across| across.values.iter().copied().map(Some).collect());
         let mut jobs = Vec::new();
-        for value in &sweep.values {
-            let varied = document.with(&sweep.key, toml::Value::Float(*value))?;
+        for (value, second) in sweep.values.iter().flat_map(|value| across.iter().map(move |second| (*value, *second))) {
+            let mut varied = document.with(&sweep.key, toml::Value::Float(value))?;
+            if let (Some(across), Some(second)) = (&sweep.across, second) {
+                varied = varied.with(&across.key, toml::Value::Float(second))?;
+            }
             for (variant, scenario) in varied.variants()? {
                 if sweep.variants.contains(&variant.name) && variants.iter().any(|(run, _)| run.name == variant.name) {
-                    jobs.push((*value, variant, scenario));
+                    jobs.push((value, second, variant, scenario));
                 }
             }
         }
-        let mut points = parallel(&jobs, |(value, variant, scenario)| {
+        let mut points = parallel(&jobs, |(value, second, variant, scenario)| {
             let setting = Setting { in_process: true, ..Setting::default() };
-            rack_run::run(scenario, variant, &setting, &mut |_| {}).map(|finished| point(*value, &finished.result))
+            rack_run::run(scenario, variant, &setting, &mut |_| {})
+                .map(|finished| SweepPoint::new(*value, *second, &finished.result))
         });
-        let points = points.drain(..).collect::<Result<Vec<_>, String>>().map_err(|reason| miette!("sweep {}: {reason}", sweep.key))?;
-        sweeps.push(Sweep { key: sweep.key.clone(), points });
+        let points = points
+            .drain(..)
+            .collect::<Result<Vec<_>, String>>()
+            .map_err(|reason| miette!("sweep {}: {reason}", sweep.key))?;
+        let across = sweep.across.as_ref().map(|across| across.key.clone());
+        sweeps.push(Sweep { key: sweep.key.clone(), across, points });
     }
     Ok(sweeps)
-}
-
-fn point(value: f64, result: &VariantResult) -> SweepPoint {
-    SweepPoint::new(value, result)
 }

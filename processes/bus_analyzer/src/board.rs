@@ -135,7 +135,7 @@ impl BusAnalyzer {
         sorted.clear();
         sorted.extend_from_slice(events);
         sorted
-            .sort_unstable_by_key(|event| (event.t, event.kind, event.severity, event.a.to_bits(), event.b.to_bits()));
+            .sort_unstable_by_key(|e| (e.t, e.kind, e.severity, e.cause, e.a.to_bits(), e.b.to_bits()));
         for event in &sorted {
             self.cdr.begin();
             encode::event(&mut self.cdr, event);

@@ -1,7 +1,7 @@
 //! Payloads of the rack as ROS 2 messages. Field order is that of the definitions in `schema/`.
 
 use crate::cdr::Cdr;
-use messages::{ControlProbe, Event, EventKind, JOINTS, MasterUse, Ns, PlantProbe, SensorPath, TransferRecord};
+use messages::{ControlProbe, Detector, Event, EventKind, JOINTS, MasterUse, Ns, PlantProbe, SensorPath, TransferRecord};
 
 /// Frame of all poses and wrenches: fixed in the world, z into the surface.
 pub const TASK_FRAME: &str = "task";
@@ -162,19 +162,20 @@ pub fn event(cdr: &mut Cdr, event: &Event) {
     let kind = EventKind::from_number(event.kind);
     let name = kind.map_or_else(|| format!("event-{}", event.kind), |kind| kind.name().to_owned());
     let [a, b] = kind.map_or(["a", "b"], figures);
-    let values = [(a, event.a), (b, event.b)];
-    let values = || values.iter().filter(|(key, _)| !key.is_empty());
+    let cause = Detector::from_number(event.cause).map(|detector| ("cause", detector.name().to_owned()));
+    let figures = [(a, event.a), (b, event.b)].into_iter().filter(|(key, _)| !key.is_empty());
+    let values: Vec<_> = figures.map(|(key, figure)| (key, figure.to_string())).chain(cause).collect();
 
     header(cdr, event.t, "");
     cdr.u32(1);
     cdr.u8(event.severity as u8);
     cdr.string(&name);
-    cdr.string(&values().map(|(key, value)| format!("{key} {value}")).collect::<Vec<_>>().join(", "));
+    cdr.string(&values.iter().map(|(key, value)| format!("{key} {value}")).collect::<Vec<_>>().join(", "));
     cdr.string("");
-    cdr.u32(values().count() as u32);
-    for (key, value) in values() {
+    cdr.u32(values.len() as u32);
+    for (key, value) in &values {
         cdr.string(key);
-        cdr.string(&value.to_string());
+        cdr.string(value);
     }
 }
 
@@ -198,5 +199,6 @@ const fn figures(kind: EventKind) -> [&'static str; 2] {
         RecordLost => ["", ""],
         OverrunTrip => ["job", "task"],
         FaultInjected => ["fault", ""],
+        Detected => ["figure", ""],
     }
 }

@@ -5,16 +5,17 @@
 //! allocates nothing unless the list of its writes changes.
 
 use crate::commands::{self, Refusal};
+use crate::findings::Findings;
 use crate::frame::quaternion_wxyz;
 use crate::handover::Wanted;
 use crate::output::Output;
 use crate::pipeline::{Job, Mode, Pipeline};
 use crate::program::{BusProgram, Part, Rest};
-use crate::safety::{Signs, State};
+use crate::safety::State;
 use crate::second_card::SecondCard;
 use crate::sensors::Sensors;
 use board::{Board, Inputs, Outputs};
-use messages::{Command, CommandKind, ControlProbe, Event, EventKind, Severity, Telemetry, TransferRecord, limits};
+use messages::{Command, CommandKind, ControlProbe, Detector, Event, EventKind, Severity, Telemetry, TransferRecord, limits};
 use scenario::Scenario;
 use vme::Ns;
 
@@ -29,6 +30,7 @@ pub struct ControlComputer {
     period_ns: Ns,
     program: BusProgram,
     sensors: Sensors,
+    findings: Findings,
     pipeline: Pipeline,
     end: End,
     /// Safety state that the last job saw.
@@ -84,6 +86,7 @@ impl ControlComputer {
             period_ns: scenario.rack.tasks[usize::from(task)].period_ns,
             sensors: Sensors::new(scenario, program.sensors())?,
             program,
+            findings: Findings::new(),
             pipeline: Pipeline::new(scenario)?,
             end,
             state: State::Run,
@@ -159,6 +162,11 @@ impl ControlComputer {
             let severity = Severity::Warn;
             out.mail.events.push(Event::new(t, EventKind::BusError, severity, job.into(), address));
         }
+        self.findings.begin();
+        self.sensors.report(&mut self.findings);
+        if self.hold {
+            self.findings.report(Detector::Operator, State::Hold, 0.0);
+        }
         let state = self.decide_state(t, now, out);
         let mode = match state {
             State::Run | State::Degraded => Mode::Law,
@@ -178,15 +186,8 @@ impl ControlComputer {
             End::SecondCard { card, told } => {
                 let cut = card.ram().read().torque_limited;
                 let done = self.pipeline.law_step(now, dt, sensed, mode, cut);
-                let (hold, acknowledge) = (self.hold, self.acknowledge);
-                let wanted = Wanted {
-                    held_jobs: self.sensors.held_jobs(),
-                    old_force_jobs: self.sensors.old_force_jobs(),
-                    same_force_jobs: self.sensors.same_force_jobs(),
-                    hold,
-                    acknowledge,
-                    ..done.wanted()
-                };
+                let (demand, cause) = self.findings.demanded();
+                let wanted = Wanted { demand, cause, acknowledge: self.acknowledge, ..done.wanted() };
                 card.ram().post(job, wanted);
                 if !std::mem::replace(told, true) {
                     out.rest = Some(self.program.hand_over());
@@ -216,19 +217,13 @@ impl ControlComputer {
     fn decide_state(&mut self, t: Ns, now: Ns, out: &mut Outputs) -> State {
         let state = match &mut self.end {
             End::Drives(output) => {
-                let signs = Signs {
-                    drive_status: self.sensors.status(),
-                    held_jobs: self.sensors.held_jobs(),
-                    old_force_jobs: self.sensors.old_force_jobs(),
-                    same_force_jobs: self.sensors.same_force_jobs(),
-                    speed: self.sensors.sensed().qd.amax(),
-                    finite: true,
-                    hold: self.hold,
-                    acknowledge: self.acknowledge,
-                };
-                output.decide(t, now, &signs, out)
+                let speed = self.sensors.sensed().qd.amax();
+                output.decide(t, now, &mut self.findings, speed, self.acknowledge, out)
             }
-            End::SecondCard { card, .. } => card.ram().read().state,
+            End::SecondCard { card, .. } => {
+                self.findings.tell(t, out);
+                card.ram().read().state
+            }
         };
         if state != self.state && state == State::Hold {
             self.pipeline.hold(self.sensors.sensed());

@@ -6,6 +6,7 @@
 
 use crate::safety::State;
 use arm::{DOF, JointVector, Spatial};
+use messages::Detector;
 use vme::Ns;
 
 /// What the law wants of the torques, and what the first card knows that safety must hear of.
@@ -17,20 +18,16 @@ pub struct Wanted {
     pub target_speed: JointVector,
     /// F_e (N, Nm).
     pub fe: Spatial,
-    /// Jobs in a row in which a value of the first card's sensors has been held.
-    pub held_jobs: u32,
-    /// Jobs in a row in which the force sample was too old.
-    pub old_force_jobs: u32,
-    /// Jobs in a row in which all force words were those of the job before.
-    pub same_force_jobs: u32,
-    /// The workstation asks for a hold.
-    pub hold: bool,
+    /// State that the first card's findings demand.
+    pub demand: State,
+    /// Which of them.
+    pub cause: Option<Detector>,
     /// The workstation acknowledges a stop.
     pub acknowledge: bool,
 }
 
-/// Longwords of the block: the numbers as doubles; number of the job, the three counts and the requests in one each.
-pub const LONGWORDS: u32 = 2 * (DOF + DOF + 6) as u32 + 5;
+/// Longwords of the block: the numbers as doubles; number of the job, demand, cause and acknowledgement in one each.
+pub const LONGWORDS: u32 = 2 * (DOF + DOF + 6) as u32 + 4;
 
 /// What the second card says of itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,10 +103,8 @@ mod tests {
             qdd: JointVector::repeat(qdd),
             target_speed: JointVector::zeros(),
             fe: Spatial::zeros(),
-            held_jobs: 0,
-            old_force_jobs: 0,
-            same_force_jobs: 0,
-            hold: false,
+            demand: State::Run,
+            cause: None,
             acknowledge: false,
         }
     }

@@ -15,13 +15,15 @@
 //! | `sensors`, `program`, `board` | registers, bus programs, the board |
 //! | `second_card`, `handover` | inverse dynamics, safety and D/A on the second card; what it is handed |
 //! | `output` | safety state and torques to the drives |
-//! | `commands`, `safety` | what is refused, what stops the arm |
+//! | `commands` | what is refused |
+//! | `findings`, `safety` | what a job finds wrong, and what stops the arm |
 
 mod ahic;
 mod board;
 mod cholesky;
 mod commands;
 mod erc;
+mod findings;
 mod frame;
 mod handover;
 mod inverse_dynamics;

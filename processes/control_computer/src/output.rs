@@ -2,12 +2,13 @@
 //!
 //! It runs on the card that writes the D/A converters: the only one, or the second of two.
 
+use crate::findings::Findings;
 use crate::pipeline::Mode;
 use crate::program::{BusProgram, Rest};
-use crate::safety::{Safety, Signs, State};
+use crate::safety::{Safety, State};
 use arm::JointVector;
 use board::Outputs;
-use messages::{Event, EventKind, JOINTS, Severity};
+use messages::{Detector, Event, EventKind, JOINTS, Severity};
 use scenario::Scenario;
 use vme::Ns;
 
@@ -47,10 +48,24 @@ impl Output {
         })
     }
 
-    /// The state after a job at `t` of simulated time and `now` of the board's clock; the torques' finiteness is known here.
-    pub fn decide(&mut self, t: Ns, now: Ns, signs: &Signs, out: &mut Outputs) -> State {
+    /// The state after a job at `t` of simulated time and `now` of the board's clock, with the joints' greatest speed in
+    /// rad/s; whether the torques are numbers is known here.
+    pub fn decide(
+        &mut self,
+        t: Ns,
+        now: Ns,
+        findings: &mut Findings,
+        speed: f64,
+        acknowledge: bool,
+        out: &mut Outputs,
+    ) -> State {
+        if !self.finite {
+            findings.report(Detector::NotFinite, State::Off, 0.0);
+        }
+        findings.tell(t, out);
         let before = self.safety.state();
-        let state = self.safety.decide(now, &Signs { finite: self.finite, ..*signs });
+        let (demand, cause) = findings.demanded();
+        let state = self.safety.decide(now, demand, speed, acknowledge);
         if state != before {
             let severity = match state {
                 State::Run => Severity::Ok,
@@ -58,7 +73,7 @@ impl Output {
                 State::Stop | State::Off => Severity::Error,
             };
             let (from, to) = (f64::from(before as u32), f64::from(state as u32));
-            out.mail.events.push(Event::new(t, EventKind::SafetyState, severity, from, to));
+            out.mail.events.push(Event::new(t, EventKind::SafetyState, severity, from, to).because(cause));
         }
         state
     }

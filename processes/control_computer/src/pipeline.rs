@@ -8,6 +8,7 @@ use crate::frame::{TaskFrame, TaskKinematics};
 use crate::handover::Wanted;
 use crate::inverse_dynamics::InverseDynamics;
 use crate::law::{Decided, Law};
+use crate::safety::State;
 use crate::sensors::Sensed;
 use crate::tool::{Contact, ToolCompensation};
 use crate::trajectory::Trajectory;
@@ -151,10 +152,8 @@ impl Job {
             qdd: self.law.qdd,
             target_speed: self.law.target_speed,
             fe: self.contact.fe,
-            held_jobs: 0,
-            old_force_jobs: 0,
-            same_force_jobs: 0,
-            hold: false,
+            demand: State::Run,
+            cause: None,
             acknowledge: false,
         }
     }

@@ -4,17 +4,18 @@
 //! block that does not come in time counts as a value held, so a first card that overruns, or is gone, degrades the arm
 //! and then stops it.
 
+use crate::findings::Findings;
 use crate::frame::TaskFrame;
 use crate::handover::{Ram, Word};
 use crate::inverse_dynamics::InverseDynamics;
 use crate::output::Output;
 use crate::pipeline::{BRAKING, Mode};
 use crate::program::{BusProgram, Part};
-use crate::safety::{Signs, State};
+use crate::safety::State;
 use crate::sensors::Sensors;
 use arm::{ArmModel, ArmState, JointVector};
 use board::Outputs;
-use messages::{BusWord, Event, EventKind, Severity, TransferRecord};
+use messages::{BusWord, Detector, Event, EventKind, Severity, TransferRecord};
 use scenario::Scenario;
 use vme::Ns;
 
@@ -28,6 +29,8 @@ pub struct SecondCard {
     arm: ArmModel,
     frame: TaskFrame,
     inverse: InverseDynamics,
+    findings: Findings,
+    max_missing: u32,
     output: Output,
     ram: Ram,
     torque: JointVector,
@@ -45,6 +48,8 @@ impl SecondCard {
             arm: scenario.controller_arm()?,
             frame: TaskFrame::new(&scenario.task_frame()),
             inverse: InverseDynamics::new(scenario)?,
+            findings: Findings::new(),
+            max_missing: scenario.safety.max_held_jobs,
             output: Output::new(scenario)?,
             ram: Ram::new(),
             torque: JointVector::zeros(),
@@ -97,27 +102,25 @@ impl SecondCard {
         }
         let sensed = *self.sensors.sensed();
         let period = self.first.1;
-        let mut missing = 0;
-        let mut asked = (false, false);
+        let (mut missing, mut acknowledge) = (0, false);
         let wanted = self.ram.block().map(|(at, wanted)| {
             // blocks come a period apart, and may be late by half of one
-            let periods = (t.saturating_sub(*at) + period / 2) / period;
-            missing = wanted.held_jobs.max(periods.saturating_sub(1) as u32);
+            missing = ((t.saturating_sub(*at) + period / 2) / period).saturating_sub(1) as u32;
             // a request counts once
-            asked = (std::mem::take(&mut wanted.hold), std::mem::take(&mut wanted.acknowledge));
+            acknowledge = std::mem::take(&mut wanted.acknowledge);
             *wanted
         });
-        let signs = Signs {
-            drive_status: self.sensors.status(),
-            held_jobs: self.sensors.held_jobs().max(missing),
-            old_force_jobs: wanted.map_or(0, |wanted| wanted.old_force_jobs),
-            same_force_jobs: wanted.map_or(0, |wanted| wanted.same_force_jobs),
-            speed: sensed.qd.amax(),
-            finite: true,
-            hold: asked.0,
-            acknowledge: asked.1,
-        };
-        let state = self.output.decide(t, now, &signs, out);
+        let findings = &mut self.findings;
+        findings.begin();
+        self.sensors.report(findings);
+        if let Some(wanted) = &wanted {
+            findings.demand(wanted.demand, wanted.cause);
+        }
+        if missing > 0 {
+            let demand = if missing > self.max_missing { State::Stop } else { State::Degraded };
+            findings.report(Detector::HandOver, demand, missing.into());
+        }
+        let state = self.output.decide(t, now, findings, sensed.qd.amax(), acknowledge, out);
         let mode = match (state, &wanted) {
             (State::Off, _) | (_, None) => Mode::Free,
             (State::Stop, _) => Mode::Brake,

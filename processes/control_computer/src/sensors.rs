@@ -4,10 +4,12 @@
 //! come (BERR*), or force words under an error of the receiver, leave the last value in place; how many jobs in a row a
 //! value has been held is counted, and the safety state machine decides what that means.
 
+use crate::findings::Findings;
 use crate::program::{COUNTER, COUNTS, ERRORS, FORCES, READS, STATUS, is_wide};
+use crate::safety::State;
 use arm::{JointVector, Spatial};
 use messages::registers::{encoder, force};
-use messages::{BusWord, JOINTS};
+use messages::{BusWord, Detector, JOINTS, drive_status};
 use scenario::{ForceFilter, Scenario, nanoseconds};
 use vme::Ns;
 
@@ -60,6 +62,9 @@ pub struct Sensors {
     old_force_jobs: u32,
     same_force_jobs: u32,
     status: u32,
+    /// The receiver's error word in this job; 0 where it did not come.
+    errors: u32,
+    limits: scenario::Safety,
 }
 
 impl Sensors {
@@ -94,6 +99,8 @@ impl Sensors {
             old_force_jobs: 0,
             same_force_jobs: 0,
             status: 0,
+            errors: 0,
+            limits: scenario.safety.clone(),
         })
     }
 
@@ -112,7 +119,8 @@ impl Sensors {
     pub fn read(&mut self, job: u32) -> Option<usize> {
         let came = if self.job == job { self.came } else { 0 };
         self.came = came;
-        if self.has(ERRORS) && self.words[ERRORS].value & FORCE_INVALID != 0 {
+        self.errors = if self.has(ERRORS) { self.words[ERRORS].value } else { 0 };
+        if self.errors & FORCE_INVALID != 0 {
             self.came &= !FORCE_WORDS;
         }
         let mut failed = None;
@@ -138,24 +146,40 @@ impl Sensors {
         &self.sensed
     }
 
-    /// Bits of [`messages::drive_status`].
-    pub fn status(&self) -> u32 {
-        self.status
+    /// What the registers of the last job say is wrong.
+    pub fn report(&self, findings: &mut Findings) {
+        let limits = &self.limits;
+        if self.status & drive_status::EMERGENCY_STOP != 0 {
+            findings.report(Detector::EmergencyStop, State::Off, 0.0);
+        }
+        let tripped = self.status & drive_status::AMPLIFIER_TRIPPED;
+        if tripped != 0 {
+            findings.report(Detector::AmplifierTrip, State::Off, tripped.trailing_zeros().into());
+        }
+        for &index in &self.registers {
+            let held = self.held[index];
+            if held > 0 {
+                let demand = if held > limits.max_held_jobs { State::Stop } else { State::Degraded };
+                findings.report(self.why_held(index), demand, index as f64);
+            }
+        }
+        if self.old_force_jobs > 0 {
+            let demand = if self.old_force_jobs > limits.max_old_force_jobs { State::Stop } else { State::Hold };
+            findings.report(Detector::ForceAge, demand, self.old_force_jobs.into());
+        }
+        if limits.max_same_force_jobs > 0 && self.same_force_jobs > limits.max_same_force_jobs {
+            findings.report(Detector::ForceFrozen, State::Hold, self.same_force_jobs.into());
+        }
     }
 
-    /// Jobs in a row in which the worst value has been held.
-    pub fn held_jobs(&self) -> u32 {
-        self.held.iter().copied().max().unwrap_or(0)
-    }
-
-    /// Jobs in a row in which the force sample was older than the scenario allows.
-    pub fn old_force_jobs(&self) -> u32 {
-        self.old_force_jobs
-    }
-
-    /// Jobs in a row in which all force words were those of the job before.
-    pub fn same_force_jobs(&self) -> u32 {
-        self.same_force_jobs
+    /// Why the word that is held was not taken.
+    fn why_held(&self, index: usize) -> Detector {
+        let invalid = self.errors & FORCE_INVALID;
+        match 1 << index & FORCE_WORDS != 0 && invalid != 0 {
+            true if invalid & !u32::from(force::ERROR_SATURATED) == 0 => Detector::ForceFullScale,
+            true => Detector::ForceErrorWord,
+            false => Detector::BusError,
+        }
     }
 
     /// Age of the force sample at `now`: since its filter's output was published. The receiver's counter numbers the
@@ -233,6 +257,13 @@ mod tests {
         scenario::load("table-5-3", &overrides).unwrap().scenario().unwrap()
     }
 
+    /// What the sensors demand, and because of what.
+    fn demanded(sensors: &Sensors) -> (State, Option<Detector>) {
+        let mut findings = Findings::new();
+        sensors.report(&mut findings);
+        findings.demanded()
+    }
+
     fn word(job: u32, index: usize, value: u32, t: Ns) -> BusWord {
         BusWord { t, addr: 0, value, job, task: 0, index: index as u16 }
     }
@@ -291,36 +322,38 @@ mod tests {
         let mut sensors = all(&scenario(&[]));
         let counts = sensors.counts;
         give(&mut sensors, 0, counts.map(|c| c + 10), 0);
-        assert_eq!((sensors.read(0), sensors.held_jobs()), (None, 0));
+        assert_eq!((sensors.read(0), demanded(&sensors).0), (None, State::Run));
         let before = *sensors.sensed();
         for job in 1..=3 {
             for index in (0..READS).filter(|&index| index != COUNTS + 4) {
-                let value = if index == STATUS { 1 } else { (counts[index.min(13) / 2] + 10) as u32 };
-                let value =
-                    if (FORCES..STATUS).contains(&index) || index % 2 == 1 && index < FORCES { 0 } else { value };
+                let is_count = index < FORCES && index % 2 == 0;
+                let value = if is_count { (counts[index / 2] + 10) as u32 } else { 0 };
                 sensors.take(&word(job, index, value, 0));
             }
             // only the first miss in a row is news
             let failed = sensors.read(job);
             assert_eq!(failed, (job == 1).then_some(COUNTS + 4));
-            assert_eq!(sensors.held_jobs(), job);
+            assert_eq!(demanded(&sensors), (State::Degraded, Some(Detector::BusError)));
             assert_eq!(sensors.sensed().q[2], before.q[2]);
         }
-        assert_eq!(sensors.status(), 1);
-        give(&mut sensors, 4, counts, 0);
-        assert_eq!((sensors.read(4), sensors.held_jobs()), (None, 0));
+        give(&mut sensors, 5, counts, 0);
+        sensors.read(4);
+        assert_eq!(demanded(&sensors).0, State::Stop, "nothing came in job 4");
+        give(&mut sensors, 6, counts, 0);
+        assert_eq!((sensors.read(6), demanded(&sensors).0), (None, State::Run));
     }
 
     #[test]
     fn under_a_receiver_error_or_saturation_the_force_is_held() {
         let mut sensors = all(&scenario(&[]));
         let counts = sensors.counts;
-        for (job, errors, force, held) in [
-            (0, 0, 100.0, 0),
-            (1, u32::from(force::ERROR_CRC), 100.0, 1),
-            (2, u32::from(force::ERROR_CRC), 100.0, 2),
-            (3, 1 << 2, 100.0, 3),
-            (4, 0, 100.0 + 800.0 / 3.0, 0),
+        let why = |detector| (State::Degraded, Some(detector));
+        for (job, errors, force, expected) in [
+            (0, 0, 100.0, (State::Run, None)),
+            (1, u32::from(force::ERROR_CRC), 100.0, why(Detector::ForceErrorWord)),
+            (2, u32::from(force::ERROR_CRC), 100.0, why(Detector::ForceErrorWord)),
+            (3, 1 << 2, 100.0, why(Detector::ForceFullScale)),
+            (4, 0, 100.0 + 800.0 / 3.0, (State::Run, None)),
         ] {
             give(&mut sensors, job, counts, 0);
             let newtons = f64::from(job) * 100.0 / 3.0 * 2.0 + 100.0;
@@ -328,7 +361,7 @@ mod tests {
             sensors.take(&word(job, ERRORS, errors, 0));
             sensors.read(job);
             assert!((sensors.sensed().wrench[0] - force).abs() < 0.05, "{job}");
-            assert_eq!(sensors.held_jobs(), held);
+            assert_eq!(demanded(&sensors), expected);
         }
     }
 

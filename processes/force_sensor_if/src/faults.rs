@@ -5,7 +5,7 @@
 
 use crate::gauges::Normal;
 use crate::{AXES, Counts};
-use scenario::{Fault, FaultKind, Occurrence, Scenario};
+use scenario::{Fault, FaultKind, Occurrence, Scenario, Site};
 use vme::Ns;
 
 /// Random streams of the added noise begin here.
@@ -37,7 +37,7 @@ impl Faults {
     /// The faults that the scenario plans for the force sensor.
     pub fn new(scenario: &Scenario) -> Faults {
         let mut to_begin = scenario.occurrences();
-        to_begin.retain(|occurrence| scenario.faults[occurrence.fault].kind.is_of_force_sensor());
+        to_begin.retain(|occurrence| scenario.fault_site(occurrence.fault) == Ok(Site::ForceSensor));
         to_begin.sort_by_key(|occurrence| (occurrence.from, occurrence.fault));
         let planned = |(i, fault): (usize, &Fault)| Planned {
             stated: fault.clone(),

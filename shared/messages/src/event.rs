@@ -1,5 +1,6 @@
 //! Things that happened and that a person wants to know.
 
+use crate::Detector;
 use bytemuck::{Pod, Zeroable};
 
 /// How bad it is, as in `diagnostic_msgs/DiagnosticStatus`.
@@ -24,7 +25,7 @@ pub enum EventKind {
     TargetErrorLimit = 2,
     /// Torque saturation of joint `b` begins (`a` = 1) or ceases (`a` = 0).
     TorqueLimit = 3,
-    /// Safety state changes from `a` to `b`.
+    /// Safety state changes from `a` to `b`; [`Event::cause`] says why.
     SafetyState = 4,
     /// The force sensor's tare is taken; `a` = its z force, N.
     Tare = 5,
@@ -50,6 +51,8 @@ pub enum EventKind {
     OverrunTrip = 15,
     /// Fault `a` of the scenario is injected.
     FaultInjected = 16,
+    /// The detector [`Event::cause`] begins to fire; `a` = its figure (axis, joint, address, number).
+    Detected = 17,
 }
 
 impl EventKind {
@@ -72,6 +75,7 @@ impl EventKind {
             EventKind::RecordLost => "record-lost",
             EventKind::OverrunTrip => "overrun-trip",
             EventKind::FaultInjected => "fault-injected",
+            EventKind::Detected => "detected",
         }
     }
 
@@ -95,6 +99,7 @@ impl EventKind {
             RecordLost,
             OverrunTrip,
             FaultInjected,
+            Detected,
         ]
         .into_iter()
         .find(|kind| *kind as u32 == number)
@@ -115,11 +120,20 @@ pub struct Event {
     pub a: f64,
     /// Second figure.
     pub b: f64,
+    /// A [`Detector`] by number; 0 = none.
+    pub cause: u32,
+    /// Zero.
+    pub reserved: u32,
 }
 
 impl Event {
     /// An event of this kind at simulated time `t`.
     pub fn new(t: u64, kind: EventKind, severity: Severity, a: f64, b: f64) -> Event {
-        Event { t, kind: kind as u32, severity: severity as u32, a, b }
+        Event { t, kind: kind as u32, severity: severity as u32, a, b, cause: 0, reserved: 0 }
+    }
+
+    /// The same event, because this detector fired.
+    pub fn because(self, cause: Option<Detector>) -> Event {
+        Event { cause: cause.map_or(0, |detector| detector as u32), ..self }
     }
 }

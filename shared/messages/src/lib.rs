@@ -9,6 +9,7 @@ mod board_id;
 mod bus;
 mod command;
 mod control;
+mod detector;
 mod event;
 mod grant;
 mod header;
@@ -22,6 +23,7 @@ pub use board_id::{BOARDS, BoardId};
 pub use bus::{BusWord, TransferRecord};
 pub use command::{Command, CommandKind, PathKind};
 pub use control::{ControlProbe, limits};
+pub use detector::{DETECTORS, Detector};
 pub use event::{Event, EventKind, Severity};
 pub use grant::{Grant, NOBODY, OpRecord, Reply, flags};
 pub use header::{Header, Kind};
@@ -31,6 +33,6 @@ pub use telemetry::Telemetry;
 pub use vme::Ns;
 
 /// Version of everything in this crate; channels of different versions never meet.
-pub const PROTOCOL: u32 = 2;
+pub const PROTOCOL: u32 = 3;
 /// Number of joints of the arm.
 pub const JOINTS: usize = 7;

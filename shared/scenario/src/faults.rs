@@ -7,6 +7,7 @@ use crate::hardware::nanoseconds;
 use crate::model::{Fault, FaultKind, Scenario};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use messages::BoardId;
 use vme::Ns;
 
 /// Streams of faults begin here; boards use the lower ones.
@@ -25,6 +26,49 @@ pub struct Occurrence {
     pub until: Ns,
 }
 
+/// The force sensor as a fault's target.
+const FORCE_SENSOR: &str = "force_sensor";
+/// The joints as targets, counted from the base.
+const JOINT_NAMES: [&str; messages::JOINTS] = ["joint-1", "joint-2", "joint-3", "joint-4", "joint-5", "joint-6", "joint-7"];
+/// Boards whose messages travel over the bus.
+const SENDERS: [BoardId; 5] = [
+    BoardId::DaIo,
+    BoardId::ForceSensorIf,
+    BoardId::EncoderIf,
+    BoardId::ControlComputer,
+    BoardId::Workstation,
+];
+/// Boards that may crash: all but the arm, which is physics.
+const COMPUTERS: [BoardId; 6] = [
+    BoardId::DaIo,
+    BoardId::ForceSensorIf,
+    BoardId::EncoderIf,
+    BoardId::ControlComputer,
+    BoardId::Workstation,
+    BoardId::BusAnalyzer,
+];
+
+/// Where a fault acts, and so who carries it out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Site {
+    /// Bridges, cable and samples of the force sensor.
+    ForceSensor,
+    /// Encoder of a joint, from 0.
+    Encoder(usize),
+    /// D/A channel of a joint.
+    Converter(usize),
+    /// Amplifier and brake of a joint.
+    Drive(usize),
+    /// Messages that this board sends over the bus.
+    Messages(BoardId),
+    /// This board: its process, clock or program.
+    Board(BoardId),
+    /// The supply of all boards.
+    Power,
+    /// Bus and processors.
+    Timing(vme::FaultKind),
+}
+
 impl Scenario {
     /// When each fault holds, in the order of the faults, then of time.
     pub fn occurrences(&self) -> Vec<Occurrence> {
@@ -37,7 +81,7 @@ impl Scenario {
         let (mut plan, mut known) = (vme::FaultPlan::default(), Vec::new());
         for occurrence in self.occurrences() {
             // a target that does not exist has been refused
-            if let Ok(Some(kind)) = self.timing_fault(occurrence.fault) {
+            if let Ok(Site::Timing(kind)) = self.fault_site(occurrence.fault) {
                 let Occurrence { from: from_ns, until: until_ns, .. } = occurrence;
                 plan.faults.push(vme::Fault { from_ns, until_ns, kind });
                 known.push(occurrence);
@@ -46,52 +90,59 @@ impl Scenario {
         (plan, known)
     }
 
-    /// What a fault is to the timing plane; `None` for faults of signals.
-    fn timing_fault(&self, fault: usize) -> Result<Option<vme::FaultKind>, Problem> {
+    /// Where a fault acts. The problem names what its kind befalls.
+    pub fn fault_site(&self, fault: usize) -> Result<Site, Problem> {
+        use FaultKind::*;
         let Fault { target, kind, amount, .. } = &self.faults[fault];
-        let key = format!("fault.{fault}.target");
         let rack = &self.rack;
+        let unknown = |what: &str, names: &[&str]| {
+            let expected = format!("is `{target}`, expected {what} for `{}`: {}", kind.name(), names.join(", "));
+            Problem::new(format!("fault.{fault}.target"), expected)
+        };
         let find = |what: &str, names: Vec<&str>| {
-            let place = names.iter().position(|name| name == target);
-            place.map(|i| i as u16).ok_or_else(|| {
-                Problem::new(&key, format!("is `{target}`, expected {what} of the rack: {}", names.join(", ")))
-            })
+            names.iter().position(|name| name == target).map(|i| i as u16).ok_or_else(|| unknown(what, &names))
         };
-        let only = |expected: &str| match target == expected {
-            true => Ok(()),
-            false => Err(Problem::new(&key, format!("is `{target}`, expected `{expected}` for this kind"))),
+        let only = |name: &str, site: Site| {
+            find("this name", vec![name])?;
+            Ok(site)
         };
-        Ok(Some(match kind {
-            kind if kind.is_of_force_sensor() => {
-                only("force_sensor")?;
-                return Ok(None);
+        let joint = || find("a joint", JOINT_NAMES.to_vec()).map(usize::from);
+        let board = |boards: &[BoardId]| {
+            find("a board", boards.iter().map(|board| board.name()).collect()).map(|i| boards[usize::from(i)])
+        };
+        let task = || find("a task of the rack", rack.tasks.iter().map(|task| task.name.as_str()).collect());
+        let timing = |kind| Ok(Site::Timing(kind));
+        match kind {
+            Delay | WireBreak if target == FORCE_SENSOR => Ok(Site::ForceSensor),
+            Bias | Drift | Stuck | Noise | Spike | Saturation | Dropout => only(FORCE_SENSOR, Site::ForceSensor),
+            WireBreak | LostCounts | QuadratureError | Wrap | IndexLoss => Ok(Site::Encoder(joint()?)),
+            DaStuck | DaOffset => Ok(Site::Converter(joint()?)),
+            AmplifierTrip | BrakeSlip | BrakeStuck => Ok(Site::Drive(joint()?)),
+            Delay | Jitter | Drop | Duplicate | Reorder | BitFlip => Ok(Site::Messages(board(&SENDERS)?)),
+            Crash | Hang | ClockDrift => Ok(Site::Board(board(&COMPUTERS)?)),
+            Gone | StaleCommand | WrongCommand => only("workstation", Site::Board(BoardId::Workstation)),
+            PowerFail => only("power", Site::Power),
+            NoSlave => {
+                let names = rack.slaves.iter().map(|slave| slave.name.as_str()).collect();
+                timing(vme::FaultKind::NoSlave(find("a slave of the rack", names)?))
             }
-            FaultKind::NoSlave => {
-                vme::FaultKind::NoSlave(find("a slave", rack.slaves.iter().map(|slave| slave.name.as_str()).collect())?)
+            Starvation => {
+                let plane = vme::Timing::new(rack.clone()).map_err(|error| Problem::new("rack", error.to_string()))?;
+                let names = (0..).map_while(|i| plane.master_name(i)).collect();
+                timing(vme::FaultKind::Starvation(find("a master of the rack", names)?))
             }
-            FaultKind::Starvation => {
-                let timing = vme::Timing::new(rack.clone()).map_err(|error| Problem::new("rack", error.to_string()))?;
-                let names: Vec<String> =
-                    (0..).map_while(|i| timing.master_name(i).map(str::to_owned)).collect();
-                vme::FaultKind::Starvation(find("a master", names.iter().map(String::as_str).collect())?)
-            }
-            FaultKind::StuckBus => {
-                only("bus")?;
-                vme::FaultKind::StuckBus
-            }
-            FaultKind::LostInterrupt => {
+            StuckBus => only("bus", Site::Timing(vme::FaultKind::StuckBus)),
+            LostInterrupt => {
                 let names = rack.interrupters.iter().map(|interrupter| interrupter.name.as_str()).collect();
-                vme::FaultKind::LostInterrupt(find("an interrupter", names)?)
+                timing(vme::FaultKind::LostInterrupt(find("an interrupter of the rack", names)?))
             }
-            FaultKind::CableOut => {
+            CableOut => {
                 let names = rack.adaptors.iter().map(|adaptor| adaptor.name.as_str()).collect();
-                vme::FaultKind::CableOut(find("an adaptor", names)?)
+                timing(vme::FaultKind::CableOut(find("an adaptor of the rack", names)?))
             }
-            _ => vme::FaultKind::Slow {
-                task: find("a task", rack.tasks.iter().map(|task| task.name.as_str()).collect())?,
-                percent: (amount * 100.0).round() as u32,
-            },
-        }))
+            Slow => timing(vme::FaultKind::Slow { task: task()?, percent: (amount * 100.0).round() as u32 }),
+            Overrun => timing(vme::FaultKind::Overrun { task: task()?, more_ns: nanoseconds(amount * 1e-3) }),
+        }
     }
 }
 
@@ -134,7 +185,7 @@ pub(crate) fn check(scenario: &Scenario) -> Result<(), Problem> {
         if let Some(least) = least.filter(|least| !(*least..=1e4).contains(&fault.amount)) {
             return refuse("amount", format!("is {}, expected {least} to 10 000", fault.amount));
         }
-        scenario.timing_fault(i)?;
+        scenario.fault_site(i)?;
         if occurrences(i, fault, scenario.seed, scenario.duration_ns()).len() >= MAX_OCCURRENCES {
             return refuse("every_s", format!("makes {MAX_OCCURRENCES} occurrences or more"));
         }

@@ -17,7 +17,7 @@ mod overrides;
 mod posture;
 
 pub use check::warnings;
-pub use faults::Occurrence;
+pub use faults::{Occurrence, Site};
 pub use error::{Problem, ScenarioError};
 pub use load::{Document, load};
 pub use model::*;

@@ -39,6 +39,13 @@ pub enum FaultKind {
         /// New execution time in percent of the nominal one.
         percent: u32,
     },
+    /// The next operation of this task takes longer, once.
+    Overrun {
+        /// The task.
+        task: u16,
+        /// By so much, ns.
+        more_ns: Ns,
+    },
     /// This task stops where it is and gets no releases: its board crashed or hangs.
     Halt(u16),
 }

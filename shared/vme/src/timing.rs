@@ -162,7 +162,7 @@ impl Timing {
                 FaultKind::StuckBus => continue,
                 FaultKind::LostInterrupt(i) => ("interrupter", i, rack.interrupters.len()),
                 FaultKind::CableOut(a) | FaultKind::Parity(a) => ("adaptor", a, rack.adaptors.len()),
-                FaultKind::Slow { task, .. } | FaultKind::Halt(task) => ("task", task, rack.tasks.len()),
+                FaultKind::Slow { task, .. } | FaultKind::Overrun { task, .. } | FaultKind::Halt(task) => ("task", task, rack.tasks.len()),
             };
             if usize::from(index) >= n {
                 return Err(RackError::Unknown { party: format!("fault {i}"), kind, name: format!("number {index}") });

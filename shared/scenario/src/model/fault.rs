@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
-    /// What it befalls: `force_sensor`, `bus`, or a slave, board, interrupter, adaptor or task of the rack by its name.
+    /// What it befalls: `force_sensor`, `joint-1` to `joint-7`, `bus`, `workstation`, `power`, or a board, slave, master,
+    /// interrupter, adaptor or task by its name, as the kind says.
     pub target: String,
     /// What is wrong.
     pub kind: FaultKind,
@@ -32,67 +33,102 @@ pub struct Fault {
     pub amount: f64,
 }
 
-/// Kinds of faults, by the class of their target.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum FaultKind {
-    /// Force sensor: `amount` is added (N, Nm).
-    Bias,
-    /// Force sensor: an error that grows by `amount` a second (N/s, Nm/s).
-    Drift,
-    /// Force sensor: every sample repeats the one before the fault; the receiver's counter goes on.
-    Stuck,
-    /// Force sensor: white Gaussian noise of standard deviation `amount` (N, Nm) on top.
-    Noise,
-    /// Force sensor: one sample in which `amount` (N, Nm) is added.
-    Spike,
-    /// Force sensor: the bridges read full scale.
-    Saturation,
-    /// Force sensor: no samples come; the receiver's counter stands.
-    Dropout,
-    /// Force sensor: the cable is open: samples read zero and the error word says that the sensor has changed.
-    WireBreak,
-    /// Slave: it does not answer; accesses end in BERR*.
-    NoSlave,
-    /// Board: the arbiter does not hear it; its requests end in the access timer.
-    Starvation,
-    /// Bus: nobody is granted.
-    StuckBus,
-    /// Interrupter: its events raise nothing.
-    LostInterrupt,
-    /// Adaptor: its cable is out.
-    CableOut,
-    /// Task: its execution times are multiplied by `amount`.
-    Slow,
+macro_rules! fault_kinds {
+    ($($(#[$doc:meta])* $kind:ident = $name:literal;)*) => {
+        /// Kinds of faults; what each befalls stands first.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        pub enum FaultKind {
+            $($(#[$doc])* #[serde(rename = $name)] $kind,)*
+        }
+
+        impl FaultKind {
+            /// All kinds.
+            pub const ALL: &[FaultKind] = &[$(FaultKind::$kind,)*];
+
+            /// Its name in a scenario.
+            pub const fn name(self) -> &'static str {
+                match self { $(FaultKind::$kind => $name,)* }
+            }
+        }
+    };
 }
 
-impl FaultKind {
-    /// Its name in a scenario.
-    pub const fn name(self) -> &'static str {
-        use FaultKind::*;
-        match self {
-            Bias => "bias",
-            Drift => "drift",
-            Stuck => "stuck",
-            Noise => "noise",
-            Spike => "spike",
-            Saturation => "saturation",
-            Dropout => "dropout",
-            WireBreak => "wire-break",
-            NoSlave => "no-slave",
-            Starvation => "starvation",
-            StuckBus => "stuck-bus",
-            LostInterrupt => "lost-interrupt",
-            CableOut => "cable-out",
-            Slow => "slow",
-        }
-    }
-
-    /// Whether it is a fault of the force sensor's signal.
-    pub fn is_of_force_sensor(self) -> bool {
-        use FaultKind::*;
-        matches!(self, Bias | Drift | Stuck | Noise | Spike | Saturation | Dropout | WireBreak)
-    }
+fault_kinds! {
+    /// Force sensor: `amount` is added (N, Nm).
+    Bias = "bias";
+    /// Force sensor: an error that grows by `amount` a second (N/s, Nm/s).
+    Drift = "drift";
+    /// Force sensor: every sample repeats the one before the fault; the receiver's counter goes on.
+    Stuck = "stuck";
+    /// Force sensor: white Gaussian noise of standard deviation `amount` (N, Nm) on top.
+    Noise = "noise";
+    /// Force sensor: one sample in which `amount` (N, Nm) is added.
+    Spike = "spike";
+    /// Force sensor: the bridges read full scale.
+    Saturation = "saturation";
+    /// Force sensor: no samples come; the receiver's counter stands.
+    Dropout = "dropout";
+    /// Force sensor: samples come `amount` ms late. Board: its messages do.
+    Delay = "delay";
+    /// Force sensor: the cable is open, samples read zero and the error word says that the sensor has changed. Joint: the
+    /// encoder's lines are open, its count stands and its status says so.
+    WireBreak = "wire-break";
+    /// Joint: the encoder loses `amount` counts, once.
+    LostCounts = "lost-counts";
+    /// Joint: the encoder's A and B tracks change at once, `amount` times, each one an error of two counts.
+    QuadratureError = "quadrature-error";
+    /// Joint: the encoder's counter wraps at `amount` bits instead of its width.
+    Wrap = "wrap";
+    /// Joint: the encoder's index pulses do not come.
+    IndexLoss = "index-loss";
+    /// Joint: the D/A output stays where it is.
+    DaStuck = "da-stuck";
+    /// Joint: `amount` (V) is added to the D/A output.
+    DaOffset = "da-offset";
+    /// Joint: the amplifier trips.
+    AmplifierTrip = "amplifier-trip";
+    /// Joint: the brake, engaged, holds `amount` times its torque (0: nothing).
+    BrakeSlip = "brake-slip";
+    /// Joint: the brake does not release, or falls in.
+    BrakeStuck = "brake-stuck";
+    /// Board: its messages come up to `amount` ms late, at random.
+    Jitter = "jitter";
+    /// Board: its messages get lost.
+    Drop = "drop";
+    /// Board: its messages come twice.
+    Duplicate = "duplicate";
+    /// Board: every second message comes after the one that follows it.
+    Reorder = "reorder";
+    /// Board: `amount` bits of each message are flipped.
+    BitFlip = "bit-flip";
+    /// Slave: it does not answer; accesses end in BERR*.
+    NoSlave = "no-slave";
+    /// Master: the arbiter does not hear it; its requests end in the access timer.
+    Starvation = "starvation";
+    /// Bus: nobody is granted.
+    StuckBus = "stuck-bus";
+    /// Interrupter: its events raise nothing.
+    LostInterrupt = "lost-interrupt";
+    /// Adaptor: its cable is out.
+    CableOut = "cable-out";
+    /// Board: its process is killed (SIGKILL).
+    Crash = "crash";
+    /// Board: its process is stopped (SIGSTOP).
+    Hang = "hang";
+    /// Task: one job takes `amount` ms longer.
+    Overrun = "overrun";
+    /// Task: its execution times are multiplied by `amount`.
+    Slow = "slow";
+    /// Board: its clock gains `amount` parts per million.
+    ClockDrift = "clock-drift";
+    /// Workstation: its program ends; no more polls, no more commands.
+    Gone = "gone";
+    /// Workstation: its newest command is sent again.
+    StaleCommand = "stale-command";
+    /// Workstation: a command with a target `amount` m away at once.
+    WrongCommand = "wrong-command";
+    /// Power: ACFAIL*; the supply holds for 4 ms more.
+    PowerFail = "power-fail";
 }
 
 fn certain() -> f64 {

@@ -357,7 +357,7 @@ impl Timing {
         task.pc += 1;
         match op {
             Op::Exec(ns) => {
-                task.remaining = self.faults.stretched(self.now, t, ns);
+                task.remaining = self.faults.stretched(self.now, t, ns) + std::mem::take(&mut task.overrun);
                 Next::Goes
             }
             Op::Raise(level) => {

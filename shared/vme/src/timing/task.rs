@@ -66,6 +66,8 @@ pub(super) struct Task {
     pub pc: usize,
     /// Execution time left of the operation taken up (and of the context switch).
     pub remaining: Ns,
+    /// Added once to the next execution time.
+    pub overrun: Ns,
     pub started: bool,
     pub record: JobRecord,
     /// Next timer tick.
@@ -88,6 +90,7 @@ impl Task {
             attempt: 0,
             pc: 0,
             remaining: 0,
+            overrun: 0,
             started: false,
             record: JobRecord { task, ..JobRecord::default() },
             tick: 0,
@@ -237,6 +240,7 @@ impl Timing {
             stop = Some(Stop::Fault { fault: i });
             match kind {
                 FaultKind::Halt(t) => self.tasks[t as usize].state = State::Halted,
+                FaultKind::Overrun { task, more_ns } => self.tasks[task as usize].overrun += more_ns,
                 FaultKind::Starvation(m) => self.arbiter.withdraw(self.masters[m as usize].place),
                 _ => {}
             }

@@ -50,8 +50,8 @@ fn the_first_card_reads_the_seconds_state_and_writes_the_hand_over_block_into_it
     assert_eq!((rig.reads.len(), state.addr, state.dir), (23, ram + mailbox::STATE, Direction::Read));
     rig.run();
     let block = accesses(&rig.rest);
-    // 20 doubles, and five longwords of numbers, counts and requests
-    assert_eq!((block.len(), block[0].addr, block[0].n), (1, ram + mailbox::HANDOVER, 45));
+    // 20 doubles, and four longwords: job, demand, cause, acknowledgement
+    assert_eq!((block.len(), block[0].addr, block[0].n), (1, ram + mailbox::HANDOVER, 44));
     assert!(rig.out.mail.words.is_empty(), "the block is the cards' own business");
     let (_, reads) = rig.second.clone().unwrap();
     // counts and speeds of seven joints, and the drives' status

@@ -95,11 +95,12 @@ pub fn run(
         record_lost: false,
         windows: 0,
         start_up: Duration::ZERO,
+        ended: Duration::ZERO,
         start,
         progress,
     };
     let error = carry_out(scenario, variant, setting, &mut witness).err();
-    let windows = start.elapsed().saturating_sub(witness.start_up);
+    let windows = witness.ended.saturating_sub(witness.start_up);
     let at_s = witness.reached as f64 * 1e-9;
     let ended = match &error {
         Some(error) => Ended::Stopped { at_s, reason: error.to_string() },
@@ -139,6 +140,7 @@ fn carry_out(
             witness.journal = measure.then(|| Journal::new(Clock::Simulated, 0));
             witness.shown = rack.folder().map(Shown::new);
             let ran = rack.run(end, witness);
+            witness.ended = witness.start.elapsed();
             witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
             ran?;
             rack.finish()
@@ -149,6 +151,7 @@ fn carry_out(
             witness.journal = measure.then(|| Journal::new(Clock::Wall, rack.zero()));
             witness.shown = rack.folder().map(Shown::new);
             let ran = rack.run(end, witness);
+            witness.ended = witness.start.elapsed();
             witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
             ran?;
             rack.finish(witness)
@@ -212,6 +215,8 @@ struct Witness<'a> {
     record_lost: bool,
     windows: u64,
     start_up: Duration,
+    /// Wall time from the start to the end of the last window.
+    ended: Duration,
     start: Instant,
     progress: &'a mut dyn FnMut(Ns),
 }

@@ -6,29 +6,29 @@
 //! README); the environment variable `VMERACK_BELL` (`yield`, `block`, `spin`) chooses another way of waiting for it.
 
 use crate::ChannelError;
-use memmap2::MmapMut;
+use crate::page::Page;
 use rustix::thread::futex;
-use std::fs::OpenOptions;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-/// A longer yield means that somebody else had the processor.
-const YIELD_LIMIT: Duration = Duration::from_micros(50);
+/// A longer yield means that somebody else had the processor: boards keep it for less, a busy loop for milliseconds.
+const YIELD_LIMIT: Duration = Duration::from_micros(500);
 /// Waits that block at once after such a yield.
 const BLOCK_AT_ONCE: u32 = 1000;
 /// Yields before blocking.
 const YIELDS: u32 = 20;
 /// Where the shared number lies, in the first bell's words.
 const ROUND_WORD: usize = 2;
-/// Bytes between two bells: a cache line pair each.
-const STRIDE: usize = 128;
+/// Where the boards' answers lie, behind it.
+const ANSWER_WORDS: usize = 8;
+/// Words from one bell to the next: a cache line pair each.
+const STRIDE: usize = 32;
 
 /// The page of all bells of a run.
 #[derive(Clone)]
 pub struct Bells {
-    page: Arc<MmapMut>,
+    page: Page,
 }
 
 /// How a process waits before it sleeps.
@@ -64,26 +64,11 @@ pub struct Bell {
 impl Bells {
     /// Maps the page at `path` with room for `count` bells, creating it where it does not exist.
     pub fn open(path: &Path, count: usize) -> Result<Bells, ChannelError> {
-        let failed =
-            |error: std::io::Error| ChannelError::Bell { path: path.display().to_string(), reason: error.to_string() };
-        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
-        file.set_len((count * STRIDE) as u64).map_err(failed)?;
-        // SAFETY: the file belongs to this run alone, has just been sized and is never shrunk while a process maps it;
-        // it is only accessed through atomics.
-        #[allow(unsafe_code)]
-        let page = unsafe { MmapMut::map_mut(&file) }.map_err(failed)?;
-        Ok(Bells { page: Arc::new(page) })
+        Ok(Bells { page: Page::open(path, count * STRIDE)? })
     }
 
     fn word(&self, index: usize, word: usize) -> &AtomicU32 {
-        let offset = index * STRIDE + word * 4;
-        let bytes = &self.page[offset..offset + 4];
-        // SAFETY: four bytes inside the page, aligned (offset is a multiple of 4, the page of 4096), valid for the borrow
-        // of `self`, and used by every process as an atomic only.
-        #[allow(unsafe_code)]
-        unsafe {
-            &*bytes.as_ptr().cast::<AtomicU32>()
-        }
+        self.page.word(index * STRIDE + word)
     }
 
     /// A number that all processes share.
@@ -94,6 +79,16 @@ impl Bells {
     /// Sets it; seen by everybody who hears a later ring.
     pub fn set_round(&self, round: u32) {
         self.word(0, ROUND_WORD).store(round, Ordering::SeqCst);
+    }
+
+    /// Board number `board` has done what the grant with this number asked for, and has nothing to say.
+    pub fn set_answered(&self, board: usize, grant: u32) {
+        self.word(0, ANSWER_WORDS + board).store(grant, Ordering::SeqCst);
+    }
+
+    /// The grant that board number `board` has answered in this way last.
+    pub fn answered(&self, board: usize) -> u32 {
+        self.word(0, ANSWER_WORDS + board).load(Ordering::SeqCst)
     }
 
     /// Puts 32-bit words where bells from `first` on would be; there must be room.

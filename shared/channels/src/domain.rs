@@ -1,6 +1,8 @@
 //! One iceoryx2 domain per run.
 
 use crate::ChannelError;
+use crate::page::Page;
+use board::routes::ROUTES;
 use iceoryx2::prelude::*;
 use std::path::{Path as StdPath, PathBuf};
 use std::time::Duration;
@@ -15,6 +17,8 @@ const SHARED_MEMORY: &str = "/dev/shm";
 pub struct Domain {
     pub(crate) node: Node<ipc::Service>,
     pub(crate) protocol: u32,
+    /// How many messages each route has carried.
+    pub(crate) tally: Page,
 }
 
 impl Domain {
@@ -43,7 +47,8 @@ impl Domain {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| setup("creating the node", format!("{error:?}")))?;
-        Ok(Domain { node, protocol: messages::PROTOCOL })
+        let tally = Page::open(&folder.join("tally"), ROUTES.len())?;
+        Ok(Domain { node, protocol: messages::PROTOCOL, tally })
     }
 }
 

@@ -47,9 +47,9 @@ pub enum ChannelError {
         /// Sequence number found.
         found: u32,
     },
-    /// The page of the bells is unusable.
+    /// A page of shared words is unusable.
     #[error("{path}: {reason}")]
-    Bell {
+    Page {
         /// The page's file.
         path: String,
         /// What the operating system says.

@@ -1,10 +1,12 @@
 //! The mail of one process: what its boards send goes to the boards beside them and to other processes.
 
+use crate::page::Page;
 use crate::{ChannelError, Domain, Port, Sender, wall_ns};
 use board::routes::{ROUTES, Route};
 use board::{BoardId, Mail};
 use messages::*;
 use std::fmt::Debug;
+use std::sync::atomic::Ordering;
 
 /// Mail that waits for each board, by [`BoardId`] number.
 pub type Inboxes = [Mail; BOARDS.len()];
@@ -21,6 +23,10 @@ pub struct Exchange {
     /// By index of their route.
     outlets: Vec<(usize, Box<dyn Outlet>)>,
     inlets: Vec<(usize, Box<dyn Inlet>)>,
+    /// How many messages each route has carried to other processes, and how many of them each inlet has seen: a look at
+    /// the number is cheaper than one into an empty channel.
+    tally: Option<Page>,
+    seen: Vec<u32>,
     /// Messages taken in since they were last asked for, where transport is measured.
     hops: Option<Vec<Span>>,
 }
@@ -36,8 +42,13 @@ trait Outlet {
 
 trait Inlet {
     fn readers(&self) -> &[BoardId];
-    /// `arrived` hears each message's header.
-    fn receive(&mut self, inboxes: &mut Inboxes, arrived: &mut dyn FnMut(&Header)) -> Result<(), ChannelError>;
+    /// Takes up to so many messages; `arrived` hears each one's header.
+    fn receive(
+        &mut self,
+        messages: u32,
+        inboxes: &mut Inboxes,
+        arrived: &mut dyn FnMut(&Header),
+    ) -> Result<(), ChannelError>;
 }
 
 /// A kind of payload: where it lies in a [`Mail`].
@@ -135,10 +146,15 @@ impl<T: Payload> Inlet for TypedInlet<T> {
         &self.readers
     }
 
-    fn receive(&mut self, inboxes: &mut Inboxes, arrived: &mut dyn FnMut(&Header)) -> Result<(), ChannelError> {
+    fn receive(
+        &mut self,
+        messages: u32,
+        inboxes: &mut Inboxes,
+        arrived: &mut dyn FnMut(&Header),
+    ) -> Result<(), ChannelError> {
         let Self { port, expected, readers } = self;
         let mut gap = None;
-        while port.receive(|header, payload| {
+        let mut take = |header: &Header, payload: &mut dyn Iterator<Item = &T>| {
             arrived(header);
             if header.seq != *expected {
                 gap = Some((*expected, header.seq));
@@ -152,7 +168,13 @@ impl<T: Payload> Inlet for TypedInlet<T> {
                 let (from, to) = two(inboxes, first[0] as usize, *other as usize);
                 T::of_mut(to).extend_from_slice(&T::of(from)[start..]);
             }
-        })? {}
+        };
+        for _ in 0..messages {
+            // an end that was opened late has missed the first ones
+            if !port.receive(&mut take)? {
+                break;
+            }
+        }
         match gap {
             Some((expected, found)) => Err(ChannelError::Lost { channel: port.name().to_owned(), expected, found }),
             None => Ok(()),
@@ -178,7 +200,7 @@ impl Exchange {
         domain: Option<&Domain>,
         process_of: impl Fn(BoardId) -> usize,
     ) -> Result<Exchange, ChannelError> {
-        let mut exchange = Exchange::default();
+        let mut exchange = Exchange { tally: domain.map(|domain| domain.tally.clone()), ..Exchange::default() };
         for (index, route) in ROUTES.iter().enumerate() {
             let readers: Vec<BoardId> = route.to.iter().copied().filter(|reader| here.contains(reader)).collect();
             let away: Vec<BoardId> =
@@ -201,6 +223,7 @@ impl Exchange {
                 exchange.inlets.push((index, open_inlet(route.kind, domain, &name, readers, processes.len())?));
             }
         }
+        exchange.seen = vec![0; exchange.inlets.len()];
         Ok(exchange)
     }
 
@@ -212,16 +235,29 @@ impl Exchange {
             }
         }
         let stamped = self.hops.is_some();
-        let mut outlets = self.outlets.iter_mut().filter(|(route, _)| ROUTES[*route].from == from);
-        outlets.try_for_each(|(_, outlet)| outlet.send(mail, stamped))
+        for (route, outlet) in self.outlets.iter_mut().filter(|(route, _)| ROUTES[*route].from == from) {
+            let before = outlet.sent();
+            outlet.send(mail, stamped)?;
+            let sent = outlet.sent().wrapping_sub(before);
+            if let Some(tally) = self.tally.as_ref().filter(|_| sent > 0) {
+                tally.word(*route).fetch_add(sent, Ordering::SeqCst);
+            }
+        }
+        Ok(())
     }
 
     /// Takes in what other processes sent to `to`, which has acted up to `stepped_to`: where transport is measured, what
     /// is not newer than that has come late.
     pub fn fetch(&mut self, to: BoardId, stepped_to: Ns, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
-        let Self { inlets, hops, .. } = self;
-        for (route, inlet) in inlets.iter_mut().filter(|(_, inlet)| inlet.readers().contains(&to)) {
-            inlet.receive(inboxes, &mut |header| {
+        let Self { inlets, hops, tally, seen, .. } = self;
+        let inlets = inlets.iter_mut().zip(seen).filter(|((_, inlet), _)| inlet.readers().contains(&to));
+        for ((route, inlet), seen) in inlets {
+            let carried = tally.as_ref().map_or(0, |tally| tally.word(*route).load(Ordering::SeqCst));
+            let news = carried.wrapping_sub(std::mem::replace(seen, carried));
+            if news == 0 {
+                continue;
+            }
+            inlet.receive(news, inboxes, &mut |header| {
                 if let Some(hops) = hops {
                     hops.push(Span {
                         t: header.t,

@@ -17,6 +17,7 @@ mod clock;
 mod domain;
 mod error;
 mod exchange;
+mod page;
 mod pod;
 mod port;
 

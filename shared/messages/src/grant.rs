@@ -28,6 +28,14 @@ pub struct Grant {
     pub round: u32,
 }
 
+impl Grant {
+    /// Number by which a board without anything to say answers: another one for every grant of a round of turns, and for
+    /// the same window's in the next one.
+    pub fn number(&self) -> u32 {
+        (self.window as u32).wrapping_mul(4) | self.round & 3
+    }
+}
+
 /// No bell is rung after the board has acted.
 pub const NOBODY: u32 = u32::MAX;
 

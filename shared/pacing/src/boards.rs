@@ -271,7 +271,7 @@ impl Boards {
             }
             Some(remote) => {
                 self.send_grant(remote, grant)?;
-                self.collect_from(remote, board)
+                self.collect(remote, board, None)
             }
         }
     }
@@ -309,7 +309,8 @@ impl Boards {
         for grant in leg {
             let board = BOARDS[grant.board as usize];
             let Some(remote) = self.place[board as usize] else { continue };
-            let answer = self.collect_from(remote, board)?;
+            let grant = Grant { round: self.round, ..*grant };
+            let answer = self.collect(remote, board, Some(grant.number()))?;
             let cut = answer.cuts(grant.until);
             self.answers.push(answer);
             if cut {
@@ -383,10 +384,13 @@ impl Boards {
         Ok(sent?)
     }
 
-    /// The board's answer to the current window's grant.
-    pub fn collect_from(&mut self, remote: usize, board: BoardId) -> Result<Answer, RunError> {
+    /// The board's answer to the current window's grant; one in a turn may be silent, by the grant's number.
+    fn collect(&mut self, remote: usize, board: BoardId, silent: Option<u32>) -> Result<Answer, RunError> {
         loop {
-            let (who, window, answer) = self.await_reply(remote)?;
+            let is_silent = |bells: &Bells| silent.is_some_and(|number| bells.answered(board as usize) == number);
+            let Some((who, window, answer)) = self.await_reply_or(remote, &is_silent)? else {
+                return Ok(Answer::default());
+            };
             if who == BoardId::BusAnalyzer && self.recorder_owes > 0 {
                 self.recorder_owes -= 1;
                 continue;
@@ -404,13 +408,29 @@ impl Boards {
 
     /// The next answer of a process.
     pub fn await_reply(&mut self, remote: usize) -> Result<(BoardId, u64, Answer), RunError> {
+        loop {
+            if let Some(reply) = self.await_reply_or(remote, &|_| false)? {
+                return Ok(reply);
+            }
+        }
+    }
+
+    /// The next answer of a process; none once `is_silent` says that it has nothing to say.
+    fn await_reply_or(
+        &mut self,
+        remote: usize,
+        is_silent: &dyn Fn(&Bells) -> bool,
+    ) -> Result<Option<(BoardId, u64, Answer)>, RunError> {
         // wall time and processor time of the board, at first and since it was last seen at work
         let (mut first, mut waiting): (Option<(Instant, u64)>, Option<(Instant, u64)>) = (None, None);
         loop {
-            if let Some(reply) = self.remotes[remote].reply(self.reached)? {
-                return Ok(reply);
+            let Some((bells, bell)) = &mut self.bells else { return Ok(None) };
+            if is_silent(bells) {
+                return Ok(None);
             }
-            let Some((_, bell)) = &mut self.bells else { continue };
+            if let Some(reply) = self.remotes[remote].reply(self.reached)? {
+                return Ok(Some(reply));
+            }
             if bell.wait(WATCH_PERIOD) > 0 {
                 continue;
             }

@@ -4,12 +4,13 @@
 //! status register clears it, whatever the value; other writes change nothing. Channels without a joint and addresses
 //! without a register read as zero. An access that failed on the bus gets no answer.
 
-use crate::counter::{self, IndexLatch};
+use crate::counter;
+use crate::faults::Channels;
 use crate::history::{History, counts_per_turn};
 use crate::velocity::{self, TIMER_NS};
 use board::{Board, Inputs, Outputs};
 use messages::registers::encoder;
-use messages::{BusWord, JOINTS, TransferRecord};
+use messages::{BusWord, Event, EventKind, JOINTS, Severity, TransferRecord};
 use scenario::{Scenario, VelocitySource, nanoseconds};
 use vme::Ns;
 
@@ -25,11 +26,9 @@ pub struct EncoderIf {
     window: Ns,
     delay: Ns,
     history: History,
-    index: [IndexLatch; JOINTS],
-    /// The index latches have followed the shafts up to here.
+    channels: Channels,
+    /// The channels have followed the shafts up to here.
     followed: f64,
-    /// Status registers of the channels.
-    status: [u32; JOINTS],
 }
 
 impl EncoderIf {
@@ -52,17 +51,21 @@ impl EncoderIf {
             window: nanoseconds(config.velocity_window_us / 1e6),
             delay,
             history: History::new(&drives, delay + TIMER_NS, scenario.plant.rate_hz),
-            index: core::array::from_fn(|i| IndexLatch::new(counts_per_turn(&drives, i))),
+            channels: Channels::new(scenario, core::array::from_fn(|i| counts_per_turn(&drives, i))),
             followed: f64::NEG_INFINITY,
-            status: [0; JOINTS],
         })
+    }
+
+    /// Card and register offset behind an address.
+    fn card(&self, addr: u32) -> Option<(usize, u32)> {
+        (self.cards.iter().enumerate())
+            .map(|(card, (base, size))| (card, addr.wrapping_sub(*base), *size))
+            .find_map(|(card, offset, size)| (offset < size).then_some((card, offset)))
     }
 
     /// Joint and register offset behind an address.
     fn channel(&self, addr: u32) -> Option<(usize, u32)> {
-        let (card, offset) = (self.cards.iter().enumerate())
-            .map(|(card, (base, size))| (card, addr.wrapping_sub(*base), *size))
-            .find_map(|(card, offset, size)| (offset < size).then_some((card, offset)))?;
+        let (card, offset) = self.card(addr)?;
         let channel = (offset / encoder::CHANNEL) as usize;
         let joint = card * encoder::CHANNELS_PER_CARD + channel;
         (channel < encoder::CHANNELS_PER_CARD && joint < JOINTS)
@@ -71,14 +74,22 @@ impl EncoderIf {
 
     /// Content of a register at `t`.
     fn content(&mut self, addr: u32, t: Ns) -> u32 {
+        if let Some((card, encoder::CARD_STATUS)) = self.card(addr) {
+            self.follow(self.delayed(t));
+            let first = card * encoder::CHANNELS_PER_CARD;
+            let joints = first..(first + encoder::CHANNELS_PER_CARD).min(JOINTS);
+            return joints.rev().fold(0, |word, joint| word << 8 | self.channels.take_status(joint));
+        }
         let Some((joint, register)) = self.channel(addr) else {
             return 0;
         };
         let t = self.delayed(t);
         match register {
             encoder::COUNT => {
-                counter::register(self.history.position(joint, t), self.counter_bits) as u32
+                let bits = self.channels.bits(joint, self.counter_bits);
+                counter::register(self.channels.counted(joint, self.history.position(joint, t)), bits) as u32
             }
+            encoder::VELOCITY if self.channels.is_open(joint) => 0,
             encoder::VELOCITY => {
                 let speed = match self.velocity {
                     VelocitySource::EdgeTime => {
@@ -88,10 +99,13 @@ impl EncoderIf {
                 };
                 (speed / encoder::VELOCITY_LSB).round() as i32 as u32
             }
-            encoder::STATUS => self.status[joint],
+            encoder::STATUS => {
+                self.follow(t);
+                self.channels.status(joint)
+            }
             encoder::INDEX => {
-                self.follow_index(t);
-                counter::register(self.index[joint].latched(), self.counter_bits) as u32
+                self.follow(t);
+                counter::register(self.channels.latched(joint), self.counter_bits) as u32
             }
             _ => 0,
         }
@@ -99,26 +113,32 @@ impl EncoderIf {
 
     fn write(&mut self, addr: u32) {
         if let Some((joint, encoder::STATUS)) = self.channel(addr) {
-            self.status[joint] = 0;
+            self.channels.take_status(joint);
         }
     }
 
-    /// Lets the index latches see the shafts up to `t`.
-    fn follow_index(&mut self, t: f64) {
+    /// Lets the channels see the shafts up to `t`.
+    fn follow(&mut self, t: f64) {
         if self.history.is_empty() {
             return;
         }
         for i in self.history.until(self.followed)..self.history.until(t) {
             if let Some(sample) = self.history.sample(i) {
-                for (latch, position) in self.index.iter_mut().zip(sample.position) {
-                    latch.follow(position);
-                }
+                self.channels.follow(&sample.position);
             }
         }
-        for (joint, latch) in self.index.iter_mut().enumerate() {
-            latch.follow(self.history.position(joint, t));
-        }
+        self.channels.follow(&core::array::from_fn(|joint| self.history.position(joint, t)));
         self.followed = t;
+    }
+
+    /// Lets the faults begin and end that do so up to `t`.
+    fn advance_faults(&mut self, t: Ns, events: &mut Vec<Event>) {
+        if self.channels.next_fault() <= t {
+            self.follow(self.delayed(t));
+            self.channels.advance(t, |fault, from| {
+                events.push(Event::new(from, EventKind::FaultInjected, Severity::Warn, fault as f64, 0.0));
+            });
+        }
     }
 
     fn delayed(&self, t: Ns) -> f64 {
@@ -140,6 +160,7 @@ impl Board for EncoderIf {
                 index,
                 ..
             } = *transfer;
+            self.advance_faults(t, &mut out.mail.events);
             for cycle in 0..transfer.n {
                 let addr = transfer.addr.wrapping_add(cycle * bytes);
                 if transfer.is_read() {
@@ -157,7 +178,8 @@ impl Board for EncoderIf {
                 }
             }
         }
-        self.follow_index(self.delayed(inputs.until));
+        self.advance_faults(inputs.until, &mut out.mail.events);
+        self.follow(self.delayed(inputs.until));
         self.history.forget(inputs.until);
     }
 }

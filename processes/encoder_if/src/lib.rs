@@ -7,6 +7,7 @@
 
 mod board;
 pub mod counter;
+mod faults;
 pub mod history;
 pub mod velocity;
 

@@ -110,6 +110,12 @@ impl ForceSensorIf {
             }
             let felt = self.faults.felt(t, wrench);
             let raw = self.faults.sent(self.gauges.sample(&felt));
+            let (raw, age) = self.faults.delayed(raw);
+            let came = k.saturating_sub(age);
+            if let Some(newest) = self.sampler.as_mut().filter(|newest| age > 0 && came <= newest.came) {
+                newest.k = k;
+                continue;
+            }
             let value = sum(&raw, &self.offset);
             self.cascade.push(k, value);
             if let Some(delay) = &mut self.delay {
@@ -135,7 +141,7 @@ impl ForceSensorIf {
             let warnings = self.gauges.near_saturation(&raw);
             self.sampler = Some(Sampler {
                 k,
-                came: k,
+                came,
                 value,
                 warnings,
                 errors,

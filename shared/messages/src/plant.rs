@@ -46,6 +46,10 @@ pub mod drive_status {
     pub const BRAKE_ENGAGED: u32 = 0x7F << 16;
     /// Emergency-stop chain open.
     pub const EMERGENCY_STOP: u32 = 1 << 24;
+    /// A D/A output is not what was written to it, as the card reads it back.
+    pub const DA_FAULT: u32 = 1 << 25;
+    /// ACFAIL*: the supply is about to go.
+    pub const POWER_FAIL: u32 = 1 << 26;
     /// The simulation left its domain (NaN, runaway joint): the run ends.
     pub const DIVERGED: u32 = 1 << 31;
 }

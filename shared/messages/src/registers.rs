@@ -50,10 +50,18 @@ pub mod encoder {
     pub const COUNT: u32 = 0x00;
     /// Speed, signed, in [`VELOCITY_LSB`] counts/s.
     pub const VELOCITY: u32 = 0x04;
-    /// Bit 0: illegal A+B change, bit 1: wire break, bit 2: index distance wrong; cleared by writing.
+    /// Bits of `STATUS_…`. The latched ones are cleared by writing.
     pub const STATUS: u32 = 0x08;
     /// Count latched at the last index pulse.
     pub const INDEX: u32 = 0x0C;
+    /// Status of both channels of a card, the second one's a byte higher; reading clears what is latched.
+    pub const CARD_STATUS: u32 = 0x20;
+    /// A and B changed at once (latched).
+    pub const STATUS_QUADRATURE: u32 = 1;
+    /// The lines' differential level is wrong: a wire is open.
+    pub const STATUS_LEVEL: u32 = 2;
+    /// Counts between two index marks are not those of a turn, or no mark came within one and a quarter (latched).
+    pub const STATUS_INDEX: u32 = 4;
     /// Counts per second of one unit of [`VELOCITY`].
     pub const VELOCITY_LSB: f64 = 1.0 / 1024.0;
     /// Channels on one card.

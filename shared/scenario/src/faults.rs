@@ -5,6 +5,7 @@
 use crate::error::Problem;
 use crate::hardware::nanoseconds;
 use crate::model::{Fault, FaultKind, Scenario};
+use crate::schedule::Schedule;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use messages::BoardId;
@@ -148,6 +149,10 @@ impl Scenario {
 
 /// Refuses faults that make no sense, each with its key.
 pub(crate) fn check(scenario: &Scenario) -> Result<(), Problem> {
+    if scenario.faults.len() > Schedule::MOST {
+        let many = format!("has {} elements, expected at most {}", scenario.faults.len(), Schedule::MOST);
+        return Err(Problem::new("fault", many));
+    }
     for (i, fault) in scenario.faults.iter().enumerate() {
         let refuse = |key: &str, message: String| Err(Problem::new(format!("fault.{i}.{key}"), message));
         let time = |key: &str, value: Option<f64>, least: f64| match value {
@@ -180,6 +185,8 @@ pub(crate) fn check(scenario: &Scenario) -> Result<(), Problem> {
         let least = match fault.kind {
             FaultKind::Noise => Some(0.0),
             FaultKind::Slow => Some(0.01),
+            FaultKind::Delay | FaultKind::Jitter | FaultKind::Overrun | FaultKind::BrakeSlip => Some(0.0),
+            FaultKind::LostCounts | FaultKind::QuadratureError | FaultKind::Wrap | FaultKind::BitFlip => Some(1.0),
             _ => None,
         };
         if let Some(least) = least.filter(|least| !(*least..=1e4).contains(&fault.amount)) {

@@ -15,6 +15,7 @@ mod load;
 pub mod model;
 mod overrides;
 mod posture;
+mod schedule;
 
 pub use check::warnings;
 pub use faults::{Occurrence, Site};
@@ -23,6 +24,7 @@ pub use load::{Document, load};
 pub use model::*;
 pub use integrable::Stiffness;
 pub use hardware::{nanoseconds, rpy_deg};
+pub use schedule::{Entry, Progress, Schedule};
 pub use posture::{PostureError, inverse_kinematics};
 
 /// Cards that the boards talk to by name; every rack has them.

@@ -111,7 +111,7 @@ fn pushing(plant: &Plant, state: &State) -> Actuation {
     let jacobian = arm::jacobian(&plant.arm, &state.q);
     let push = jacobian.tr_mul(&arm::Spatial::new(0.0, 0.0, -60.0, 0.0, 0.0, 0.0));
     let volts = std::array::from_fn(|i| (state.load[i] + push[i]) / (plant.drives[i].motor_torque(1.0)));
-    Actuation { volts, braked: 0 }
+    Actuation { volts, braked: 0, ..Actuation::SAFE }
 }
 
 fn simulate(scenario: &Scenario, case: Case, integrator: Integrator, rate: f64) -> Result<Run, String> {

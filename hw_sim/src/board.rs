@@ -6,6 +6,7 @@
 //! last good values are repeated with [`drive_status::DIVERGED`] set.
 
 use crate::energy;
+use crate::faults::Faults;
 use crate::integrate;
 use crate::plant::{Actuation, Evaluation, Plant};
 use crate::state::State;
@@ -29,7 +30,10 @@ pub struct HwSim {
     /// Instant of `state`.
     t: Ns,
     state: State,
+    /// What the cards command, and what the drives make of it.
+    commanded: Actuation,
     actuation: Actuation,
+    faults: Faults,
     /// Forces in `state` under `actuation`, where `known`.
     now: Evaluation,
     known: bool,
@@ -54,7 +58,9 @@ impl HwSim {
             runaway: scenario.plant.runaway_rad_per_s,
             t: 0,
             state,
+            commanded: Actuation::SAFE,
             actuation: Actuation::SAFE,
+            faults: Faults::new(scenario),
             now,
             known: true,
             pending: Vec::with_capacity(PENDING),
@@ -83,7 +89,7 @@ impl HwSim {
     /// Limit switches, emergency chain and brake contacts in the committed state. The switches sit in the chain.
     fn switches(&self) -> u32 {
         let (lower, upper) = (self.plant.arm.lower_limits(), self.plant.arm.upper_limits());
-        let mut status = self.actuation.braked << 16;
+        let mut status = self.actuation.braked << 16 | self.faults.tripped();
         for i in 0..DOF {
             if self.state.q[i] < lower[i] || self.state.q[i] > upper[i] {
                 status |= (1 << (8 + i)) | drive_status::EMERGENCY_STOP;
@@ -96,20 +102,31 @@ impl HwSim {
     fn actuate(&mut self) {
         let due = self.pending.iter().take_while(|command| command.t <= self.t).count();
         if let Some(last) = self.pending[..due].last() {
-            let before = self.actuation;
-            self.actuation = Actuation::from_command(last);
+            self.commanded = Actuation::from_command(last);
+        }
+        let before = self.actuation;
+        self.actuation = self.faults.spoil(self.commanded);
+        if self.actuation != before {
             for i in 0..DOF {
                 // an engaging brake starts without deflection
                 if before.braked & !self.actuation.braked & (1 << i) != 0 {
                     self.state.brake[i] = 0.0;
                 }
             }
-            if self.actuation != before {
-                self.known = false;
-                self.status = self.switches();
-            }
+            self.known = false;
+            self.status = self.switches();
         }
         self.pending.drain(..due);
+    }
+
+    /// Lets the drives' faults begin and end that do so up to now.
+    fn break_down(&mut self, out: &mut Outputs) {
+        let changed = self.faults.advance(self.t, |fault, from| {
+            out.mail.events.push(Event::new(from, EventKind::FaultInjected, Severity::Warn, fault as f64, 0.0));
+        });
+        if changed {
+            self.status = self.switches();
+        }
     }
 
     /// Carries the committed state to `t`. False where it leaves its domain; then nothing asks for it again.
@@ -235,9 +252,10 @@ impl Board for HwSim {
         if self.status & drive_status::DIVERGED != 0 {
             return self.freeze(inputs.until, out);
         }
+        self.break_down(out);
         loop {
             self.actuate();
-            let command = self.pending.first().map_or(Ns::MAX, |command| command.t);
+            let command = self.pending.first().map_or(Ns::MAX, |command| command.t).min(self.faults.next_change());
             let grid = (self.t / self.grid + 1) * self.grid;
             let next = grid.min(command);
             if next > inputs.until || next == inputs.until && command == next && grid != next {
@@ -247,6 +265,7 @@ impl Board for HwSim {
             if !self.commit(next, out) {
                 return self.freeze(inputs.until, out);
             }
+            self.break_down(out);
             let closed = self.status & !switches & (drive_status::LIMIT_SWITCH | drive_status::AMPLIFIER_TRIPPED) != 0;
             if next == grid || closed {
                 self.sample(out);

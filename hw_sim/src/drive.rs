@@ -74,15 +74,17 @@ impl Drive {
         within(volts * self.torque_per_volt, self.torque_limit)
     }
 
-    /// Friction and brake at rotor speed `v` (rad/s) while the transmission carries `load` (Nm).
+    /// Friction and brake at rotor speed `v` (rad/s) while the transmission carries `load` (Nm); the brake holds this
+    /// share of its torque, 0 = released.
     #[inline]
-    pub fn loss(&self, presliding: f64, brake_deflection: f64, v: f64, load: f64, braked: bool) -> RotorLoss {
+    pub fn loss(&self, presliding: f64, brake_deflection: f64, v: f64, load: f64, braked: f64) -> RotorLoss {
         let (friction, presliding) = self.friction.torque(presliding, v, load);
-        if !braked {
+        if braked == 0.0 {
             return RotorLoss { friction, presliding, ..RotorLoss::default() };
         }
-        let held = self.brake.held(brake_deflection, self.brake_capacity);
-        let brake = self.brake.force(held, v, self.brake_capacity);
+        let capacity = self.brake_capacity * braked;
+        let held = self.brake.held(brake_deflection, capacity);
+        let brake = self.brake.force(held, v, capacity);
         RotorLoss { friction, brake, presliding, brake_deflection: held }
     }
 
@@ -238,7 +240,7 @@ mod tests {
         for (torque, slips) in [(0.8 * data.brake_nm, false), (1.3 * data.brake_nm, true)] {
             let (mut x, mut v, mut z, mut b, h) = (0.0, 0.0, 0.0, 0.0, 1e-4);
             for _ in 0..20_000 {
-                let loss = drive.loss(z, b, v, 0.0, true);
+                let loss = drive.loss(z, b, v, 0.0, 1.0);
                 v += h * (torque - loss.friction - loss.brake) / drive.rotor;
                 x += h * v;
                 (z, b) = (loss.presliding + h * v, loss.brake_deflection + h * v);

@@ -14,6 +14,7 @@ mod board;
 pub mod contact;
 pub mod drive;
 pub mod energy;
+mod faults;
 pub mod friction;
 pub mod integrate;
 pub mod plant;

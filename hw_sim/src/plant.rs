@@ -36,11 +36,13 @@ pub struct Actuation {
     pub volts: [f64; DOF],
     /// Bit i: brake of joint i engaged.
     pub braked: u32,
+    /// Share of its torque that each brake holds.
+    pub brake_share: [f64; DOF],
 }
 
 impl Actuation {
     /// Torque off, brakes engaged.
-    pub const SAFE: Actuation = Actuation { volts: [0.0; DOF], braked: 0x7F };
+    pub const SAFE: Actuation = Actuation { volts: [0.0; DOF], braked: 0x7F, brake_share: [1.0; DOF] };
 
     /// What a command of the D/A and parallel I/O cards means.
     pub fn from_command(command: &AmplifierCommand) -> Actuation {
@@ -48,6 +50,7 @@ impl Actuation {
         Actuation {
             volts: std::array::from_fn(|i| if enabled(i) { command.volts[i] } else { 0.0 }),
             braked: !command.brake_released & 0x7F,
+            brake_share: [1.0; DOF],
         }
     }
 }
@@ -136,7 +139,7 @@ impl Plant {
         let mut loss = [RotorLoss::default(); DOF];
         let mut theta_ddot = JointVector::zeros();
         let mut transmitted = JointVector::zeros();
-        let braked = |i: usize| actuation.braked & (1 << i) != 0;
+        let braked = |i: usize| if actuation.braked & (1 << i) != 0 { actuation.brake_share[i] } else { 0.0 };
         let qdd = match self.joints {
             Joints::Flexible => {
                 for (i, drive) in self.drives.iter().enumerate() {

@@ -28,7 +28,7 @@ fn slide(stiffness: f64, hunt_crossley: f64) -> (Plant, State) {
 }
 
 fn push(force: f64) -> Actuation {
-    Actuation { volts: [force / 1e4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], braked: 0 }
+    Actuation { volts: [force / 1e4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], braked: 0, ..Actuation::SAFE }
 }
 
 /// Steps until `stop`, at most 20 s; the time taken.
@@ -165,7 +165,7 @@ fn a_very_stiff_transmission_moves_like_a_rigid_one() {
         }
         state.brake.fill(0.0);
         // the drives let go and joint 4 pushes
-        let actuation = Actuation { volts: [0.0, -1.0, 0.0, 6.0, 0.0, 0.0, 0.0], braked: 0 };
+        let actuation = Actuation { volts: [0.0, -1.0, 0.0, 6.0, 0.0, 0.0, 0.0], braked: 0, ..Actuation::SAFE };
         run(&plant, Integrator::Rk4, &mut state, &actuation, 1e-5, |_, t| t >= 0.1);
         state.q
     };
@@ -186,7 +186,7 @@ fn slow_friction_reaches_30_percent_of_the_gravity_torque_at_the_table_top() {
         sliding.qd.fill(direction * 0.05);
         // long on the way: the bristles are fully bent
         sliding.presliding.fill(direction);
-        let now = plant.evaluate(&sliding, &Actuation { volts: [0.0; 7], braked: 0 });
+        let now = plant.evaluate(&sliding, &Actuation { volts: [0.0; 7], braked: 0, ..Actuation::SAFE });
         let shares: Vec<f64> = (0..7)
             .filter(|&i| state.load[i].abs() >= 15.0)
             .map(|i| {
@@ -213,7 +213,7 @@ fn the_arm_pressed_on_the_stiffest_surface_comes_to_rest_at_the_force_that_the_m
         let push = jacobian.tr_mul(&arm::Spatial::new(0.0, 0.0, -60.0, 0.0, 0.0, 0.0));
         let volts = std::array::from_fn(|i| (state.load[i] + push[i]) / plant.drives[i].motor_torque(1.0));
         state.brake.fill(0.0);
-        let actuation = Actuation { volts, braked: 0 };
+        let actuation = Actuation { volts, braked: 0, ..Actuation::SAFE };
         run(&plant, Integrator::SemiImplicit, &mut state, &actuation, 1.0 / rate, |s, t| {
             assert!(s.out_of_domain(2.0).is_none(), "{joints} at {rate} Hz: {s:?}");
             t >= 4.0

@@ -20,7 +20,7 @@ fn press(scenario: &Scenario, integrator: Integrator) -> f64 {
     let steps = (0.4 * scenario.plant.rate_hz) as usize;
     let mut greatest: f64 = 0.0;
     for n in 0..steps {
-        let actuation = Actuation { volts: if n < steps / 2 { down } else { up }, braked: 0 };
+        let actuation = Actuation { volts: if n < steps / 2 { down } else { up }, braked: 0, ..Actuation::SAFE };
         let now = plant.evaluate(&state, &actuation);
         greatest = greatest.max(now.touch.wrench.fixed_rows::<3>(0).norm());
         integrate::step(&plant, integrator, &mut state, &now, &actuation, 1.0 / scenario.plant.rate_hz);

@@ -3,17 +3,20 @@
 //! A written word arrives ahead of its transfer and waits for it; a transfer that failed changes nothing, its word waits
 //! for the retry. A window that is run again starts from the copy made at its start.
 
-use crate::cards::{Addresses, Cards};
+use crate::cards::{Addresses, Cards, Damage};
 use board::{Board, Inputs, Ns, Outputs};
-use messages::{AmplifierCommand, BusWord, TransferRecord};
-use scenario::Scenario;
+use messages::{AmplifierCommand, BusWord, Event, EventKind, Severity, TransferRecord};
+use scenario::{FaultKind, Progress, Scenario, Schedule, Site, nanoseconds};
 
+/// Shortest time for which the supply holds after ACFAIL*, ms (VMEbus standard).
+const HOLD_UP_MS: f64 = 4.0;
 /// Words and signal changes that may wait without a new allocation.
 const PENDING: usize = 256;
 
 /// Two D/A cards and the parallel I/O card.
 pub struct DaIo {
     addresses: Addresses,
+    schedule: Schedule,
     state: State,
     /// State at the start of the last window, with what had arrived by then.
     saved: State,
@@ -27,6 +30,7 @@ struct State {
     /// Changes of the drives' signals whose time has not come.
     signals: Vec<(Ns, u32)>,
     last_signal: u32,
+    progress: Progress,
 }
 
 impl State {
@@ -35,6 +39,7 @@ impl State {
         self.words.clone_from(&other.words);
         self.signals.clone_from(&other.signals);
         self.last_signal = other.last_signal;
+        self.progress = other.progress;
     }
 
     fn absorb(&mut self, inputs: &Inputs) {
@@ -65,9 +70,11 @@ impl DaIo {
             words: Vec::with_capacity(PENDING),
             signals: Vec::with_capacity(PENDING),
             last_signal: messages::drive_status::BRAKE_ENGAGED,
+            progress: Progress::default(),
         };
         Ok(DaIo {
             addresses: Addresses::new(scenario)?,
+            schedule: Schedule::new(scenario, |site| matches!(site, Site::Converter(_) | Site::Power)),
             state: state(),
             saved: state(),
         })
@@ -108,13 +115,34 @@ impl DaIo {
             if (word.task, word.job, word.index) == (task, job, index)
                 && let Some(register) = self.addresses.register(word.addr)
             {
-                state.cards.write(data_at, register, word.value);
+                state.cards.write(data_at, register, word.value, &mut out.mail.events);
             }
         }
         // an earlier job's words will never be fetched
         state
             .words
             .retain(|w| w.task != task || (w.job >= job && (w.job, w.index) != (job, index)));
+    }
+}
+
+impl DaIo {
+    /// Faults that begin or end at `t`.
+    fn break_down(&mut self, t: Ns, events: &mut Vec<Event>) {
+        let Self { schedule, state, .. } = self;
+        schedule.advance(&mut state.progress, t, |place, from| {
+            let number = schedule.entries()[place].number as f64;
+            events.push(Event::new(from, EventKind::FaultInjected, Severity::Warn, number, 0.0));
+        });
+        let mut damage = Damage::default();
+        for (_, entry) in schedule.holding(&state.progress) {
+            match (entry.site, entry.fault.kind) {
+                (Site::Converter(joint), FaultKind::DaStuck) => damage.stuck |= 1 << joint,
+                (Site::Converter(joint), FaultKind::DaOffset) => damage.offset[joint] += entry.fault.amount,
+                (Site::Power, _) => damage.power_fail = Some(nanoseconds(entry.fault.amount.max(HOLD_UP_MS) * 1e-3)),
+                _ => {}
+            }
+        }
+        state.cards.damaged(t, damage, events);
     }
 }
 
@@ -140,13 +168,16 @@ impl Board for DaIo {
                 .peek()
                 .map_or(Ns::MAX, |transfer| transfer.data_at);
             let timer = self.state.cards.next_timer();
-            let t = signal.min(transfer).min(timer);
+            let fault = self.schedule.next_change(&self.state.progress);
+            let t = signal.min(transfer).min(timer).min(fault);
             if t == Ns::MAX || transfer == Ns::MAX && t >= inputs.until {
                 break;
             }
             let before = self.state.cards.outputs(t);
-            // at one instant: a new signal first, then a transfer (a heartbeat just in time counts), then timers
-            if signal == t {
+            // at one instant: a fault and a new signal first, then a transfer (a heartbeat just in time counts), then timers
+            if fault == t {
+                self.break_down(t, &mut out.mail.events);
+            } else if signal == t {
                 let (_, status) = self.state.signals.remove(0);
                 self.state.cards.signals(t, status, &mut out.mail.events);
             } else if transfer == t {

@@ -28,6 +28,12 @@ impl Converter {
         value & (u32::MAX >> (32 - self.bits))
     }
 
+    /// The code whose output is nearest to this one, V.
+    pub fn code(&self, volts: f64) -> u32 {
+        let half = f64::from(self.mid_scale());
+        (volts / FULL_SCALE * half + half).round().clamp(0.0, 2.0 * half - 1.0) as u32
+    }
+
     /// Output, V: the lowest code is −10 V, one code is 20/2^bits V.
     pub fn volts(&self, code: u32) -> f64 {
         let half = f64::from(self.mid_scale());
@@ -46,6 +52,10 @@ mod tests {
         assert_eq!(converter.volts(converter.mid_scale()), 0.0);
         assert_eq!(converter.volts(4095), 10.0 - 20.0 / 4096.0);
         assert_eq!(converter.latch(0xFFFF_F801), 0x801);
+        for code in [0, 1, 2047, 2048, 4095] {
+            assert_eq!(converter.code(converter.volts(code)), code);
+        }
+        assert_eq!((converter.code(-11.0), converter.code(12.0)), (0, 4095));
         assert_eq!(
             Converter::new(32).expect("32 bits").latch(u32::MAX),
             u32::MAX

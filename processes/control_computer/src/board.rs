@@ -12,7 +12,7 @@ use crate::output::Output;
 use crate::pipeline::{Job, Mode, Pipeline};
 use crate::program::{BusProgram, Part, Rest};
 use crate::safety::State;
-use crate::second_card::SecondCard;
+use crate::second_card::{BRAKES_LET_GO, SecondCard};
 use crate::sensors::Sensors;
 use board::{Board, Inputs, Outputs};
 use messages::{Command, CommandKind, ControlProbe, Detector, Event, EventKind, Severity, Telemetry, TransferRecord, limits};
@@ -28,6 +28,12 @@ const NO_SEGMENT: u32 = u32::MAX;
 pub struct ControlComputer {
     task: u16,
     period_ns: Ns,
+    limits: scenario::Safety,
+    /// Period of the workstation's console, and when it polled last, where it has.
+    console: (Ns, Option<Ns>),
+    /// Activation number of the last job, and how many in a row began after a lost release.
+    last_job: Option<u32>,
+    late_jobs: u32,
     program: BusProgram,
     sensors: Sensors,
     findings: Findings,
@@ -41,6 +47,9 @@ pub struct ControlComputer {
     on_the_way: Vec<Command>,
     /// Epoch of the last command judged.
     epoch: u32,
+    /// No segment with a force axis has begun: the tool touches nothing; the force that the last job measured, N.
+    free: bool,
+    force_n: f64,
     hold: bool,
     acknowledge: bool,
     segment: u32,
@@ -84,6 +93,13 @@ impl ControlComputer {
         Ok(ControlComputer {
             task,
             period_ns: scenario.rack.tasks[usize::from(task)].period_ns,
+            limits: scenario.safety.clone(),
+            console: (
+                scenario.task_of("workstation").map_or(0, |task| scenario.rack.tasks[usize::from(task)].period_ns),
+                None,
+            ),
+            last_job: None,
+            late_jobs: 0,
             sensors: Sensors::new(scenario, program.sensors())?,
             program,
             findings: Findings::new(),
@@ -93,6 +109,8 @@ impl ControlComputer {
             last: None,
             on_the_way: Vec::with_capacity(ON_THE_WAY),
             epoch: 0,
+            free: true,
+            force_n: 0.0,
             hold: false,
             acknowledge: false,
             segment: NO_SEGMENT,
@@ -110,6 +128,7 @@ impl ControlComputer {
         let end = transfer.addr + transfer.n * transfer.access().width.bytes();
         if transfer.is_read() {
             if transfer.addr == self.program.telemetry && transfer.is_ok() {
+                self.console.1 = Some(transfer.data_at);
                 let [older, newer] = &self.telemetry;
                 let shown = if newer.written <= transfer.data_at { newer } else { older };
                 out.mail.telemetry.push(Telemetry { t: transfer.data_at, ..*shown });
@@ -123,7 +142,7 @@ impl ControlComputer {
                 let (epoch, reason) = (command.epoch.into(), f64::from(refusal as u32));
                 let kind = EventKind::CommandRefused;
                 let event = Event::new(transfer.data_at, kind, Severity::Warn, epoch, reason);
-                out.mail.events.push(event);
+                out.mail.events.push(event.because(Some(refusal.detector())));
             }
         }
     }
@@ -140,6 +159,7 @@ impl ControlComputer {
                 if self.hold || self.state > State::Degraded {
                     return Err(Refusal::State);
                 }
+                commands::check_motion(&segment, &trajectory.last_target(), &self.limits)?;
                 if segment.start < trajectory.last_start() {
                     return Err(Refusal::Times);
                 }
@@ -157,16 +177,17 @@ impl ControlComputer {
 
     /// One job of the (first) control task at its decision, at `t` of simulated time and `now` of this board's clock.
     fn job(&mut self, job: u32, t: Ns, now: Ns, out: &mut Outputs) {
-        if let Some(register) = self.sensors.read(job) {
+        let since = self.last.map_or(self.period_ns, |last| now.saturating_sub(last).max(1));
+        let dt = since as f64 * 1e-9;
+        if let Some(register) = self.sensors.read(job, dt) {
             let address = self.program.register_address(register).into();
             let severity = Severity::Warn;
-            out.mail.events.push(Event::new(t, EventKind::BusError, severity, job.into(), address));
+            let event = Event::new(t, EventKind::BusError, severity, job.into(), address);
+            out.mail.events.push(event.because(Some(Detector::BusError)));
         }
         self.findings.begin();
         self.sensors.report(&mut self.findings);
-        if self.hold {
-            self.findings.report(Detector::Operator, State::Hold, 0.0);
-        }
+        self.supervise(job, t, now);
         let state = self.decide_state(t, now, out);
         let mode = match state {
             State::Run | State::Degraded => Mode::Law,
@@ -174,13 +195,14 @@ impl ControlComputer {
             State::Stop => Mode::Brake,
             State::Off => Mode::Free,
         };
-        let since = self.last.map_or(self.period_ns, |last| now.saturating_sub(last).max(1));
         self.last = Some(now);
-        let (dt, sensed) = (since as f64 * 1e-9, self.sensors.sensed());
+        let sensed = self.sensors.sensed();
         let (done, written) = match &mut self.end {
             End::Drives(output) => {
                 let done = self.pipeline.step(now, dt, sensed, mode);
-                let written = output.write((self.task, job), t, mode, &done.torque, &self.program, out);
+                let written = output.write((self.task, job), (t, now), mode, &done.torque, &self.program, out);
+                let acts = output.released().is_some_and(|since| now > since + BRAKES_LET_GO);
+                self.pipeline.inverse().sent(&sensed.qd, acts.then_some(done.torque));
                 (done, written)
             }
             End::SecondCard { card, told } => {
@@ -196,6 +218,8 @@ impl ControlComputer {
             }
         };
         (self.hold, self.acknowledge) = (false, false);
+        self.free &= self.pipeline.trajectory().impedance().selection.iter().all(|s| *s == 1.0);
+        self.force_n = done.contact.fe.fixed_rows::<3>(0).norm();
         self.tell(t, &done, out);
         out.mail.control_probe.push(self.probe(t, job, state, &done));
         self.telemetry = [
@@ -211,6 +235,38 @@ impl ControlComputer {
                 wrench: done.contact.fe.into(),
             },
         ];
+    }
+
+    /// What is wrong beside the sensors' registers.
+    fn supervise(&mut self, job: u32, t: Ns, now: Ns) {
+        let Self { limits, findings, .. } = self;
+        if self.hold {
+            findings.report(Detector::Operator, State::Hold, 0.0);
+        }
+        let (period, polled) = self.console;
+        if let Some(polled) = polled
+            && limits.max_missed_polls > 0
+            && t.saturating_sub(polled) > period * Ns::from(limits.max_missed_polls) + period / 2
+        {
+            findings.report(Detector::CommandAge, State::Hold, (t - polled) as f64 * 1e-9);
+        }
+        let lost = self.last_job.map_or(0, |last| job.wrapping_sub(last).saturating_sub(1));
+        self.last_job = Some(job);
+        self.late_jobs = if lost > 0 { self.late_jobs + 1 } else { 0 };
+        if lost > 0 {
+            let stop = limits.max_late_jobs > 0 && self.late_jobs > limits.max_late_jobs;
+            findings.report(Detector::Overrun, if stop { State::Stop } else { State::Degraded }, lost.into());
+        }
+        if let End::Drives(output) = &self.end {
+            self.sensors.report_brakes(now, output.released(), findings);
+            let (joint, share) = self.pipeline.inverse().disturbed();
+            if limits.max_residual_share > 0.0 && share > limits.max_residual_share {
+                findings.report(Detector::TrackingResidual, State::Off, joint as f64);
+            }
+        }
+        if limits.max_free_force_n > 0.0 && self.free && self.force_n > limits.max_free_force_n {
+            findings.report(Detector::ForceZero, State::Stop, self.force_n);
+        }
     }
 
     /// The safety state: decided here, or as the second card's state word says.

@@ -5,9 +5,9 @@
 
 use crate::ahic::Impedance;
 use crate::frame::rotation_of_wxyz;
-use crate::trajectory::Segment;
+use crate::trajectory::{LINE_PEAK, QUINTIC_PEAK, Segment};
 use arm::{Pose, Spatial};
-use messages::{Command, PathKind};
+use messages::{Command, Detector, PathKind};
 use nalgebra::Vector3;
 
 /// Why a command was refused. The numbers appear in the record.
@@ -44,9 +44,38 @@ pub enum Refusal {
     /// No room in the queue.
     #[error("too many segments wait")]
     QueueFull = 10,
+    /// The desired position would jump too far.
+    #[error("the desired position would jump further than safety.max_command_step_m")]
+    Step = 12,
+    /// The desired position would move too fast.
+    #[error("the desired position would move faster than safety.max_command_speed_m_per_s")]
+    Speed = 13,
     /// The safety state does not allow it.
     #[error("the safety state does not allow it")]
     State = 11,
+}
+
+impl Refusal {
+    /// What sees it.
+    pub fn detector(self) -> Detector {
+        if self == Refusal::Epoch { Detector::CommandEpoch } else { Detector::CommandCheck }
+    }
+}
+
+/// Refuses a segment that would let the desired position jump too far from `from`, or move too fast.
+pub fn check_motion(segment: &Segment, from: &Vector3<f64>, limits: &scenario::Safety) -> Result<(), Refusal> {
+    let way = (segment.target.p - from).norm();
+    let peak = match segment.path {
+        PathKind::Hold => return Ok(()),
+        PathKind::Step if way > limits.max_command_step_m => return Err(Refusal::Step),
+        PathKind::Step => return Ok(()),
+        PathKind::PointToPoint => QUINTIC_PEAK,
+        PathKind::Line => LINE_PEAK,
+    };
+    if peak * way > limits.max_command_speed_m_per_s * segment.move_time as f64 * 1e-9 {
+        return Err(Refusal::Speed);
+    }
+    Ok(())
 }
 
 /// The segment that a [`Command`] of kind `Segment` describes.

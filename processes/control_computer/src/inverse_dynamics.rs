@@ -4,6 +4,7 @@
 //! contact force forward and can be switched off; friction is fed forward on the *target* velocity, so that it does not
 //! close another loop. Torques beyond a drive's limit are cut there and reported.
 
+use crate::disturbance::Disturbance;
 use crate::frame::{TaskKinematics, transposed_times};
 use crate::handover::Wanted;
 use crate::pipeline::Mode;
@@ -16,6 +17,7 @@ use scenario::Scenario;
 pub struct InverseDynamics {
     drives: Drives,
     force_feed_forward: bool,
+    disturbance: Disturbance,
 }
 
 impl InverseDynamics {
@@ -25,7 +27,23 @@ impl InverseDynamics {
         Ok(InverseDynamics {
             drives: Drives::new(&scenario.drives()?, controller.friction_compensation),
             force_feed_forward: controller.force_feed_forward,
+            disturbance: Disturbance::new(),
         })
+    }
+
+    /// Compares what the arm did in the `dt` seconds since the last job with the torques that it sent.
+    pub fn observe(&mut self, arm: &ArmState, tool: &TaskKinematics, qd: &JointVector, fe: &Spatial, dt: f64) {
+        self.disturbance.observe(&self.drives, arm, tool, qd, fe, dt);
+    }
+
+    /// The job sends these torques at these joint speeds; none: the drives are off or still on their brakes.
+    pub fn sent(&mut self, qd: &JointVector, torque: Option<JointVector>) {
+        self.disturbance.sent(qd, torque);
+    }
+
+    /// The joint with the greatest torque that nothing accounts for, and that torque as a share of its drive's limit.
+    pub fn disturbed(&self) -> (usize, f64) {
+        self.disturbance.greatest(&self.drives)
     }
 
     /// τ within the drives' limits, and the joints that were cut there, a bit each.

@@ -16,14 +16,17 @@
 //! | `second_card`, `handover` | inverse dynamics, safety and D/A on the second card; what it is handed |
 //! | `output` | safety state and torques to the drives |
 //! | `commands` | what is refused |
+//! | `force_noise`, `disturbance` | how noisy the force is; torques that nothing accounts for |
 //! | `findings`, `safety` | what a job finds wrong, and what stops the arm |
 
 mod ahic;
 mod board;
 mod cholesky;
 mod commands;
+mod disturbance;
 mod erc;
 mod findings;
+mod force_noise;
 mod frame;
 mod handover;
 mod inverse_dynamics;

@@ -18,6 +18,8 @@ pub struct Output {
     converters: Converters,
     /// What the last job did after its decision.
     rest: Option<Rest>,
+    /// Since when the drives have been on and the brakes released, own clock.
+    released: Option<Ns>,
     finite: bool,
 }
 
@@ -44,6 +46,7 @@ impl Output {
             safety: Safety::new(&scenario.safety),
             converters: Converters { nm_per_v, bits: scenario.da_io.bits.into() },
             rest: None,
+            released: None,
             finite: true,
         })
     }
@@ -78,17 +81,23 @@ impl Output {
         state
     }
 
+    /// Since when the brakes have been released, own clock; none: they are engaged.
+    pub fn released(&self) -> Option<Ns> {
+        self.released
+    }
+
     /// Tells the drives, with these torques; returns when the job will have computed.
     pub fn write(
         &mut self,
         (task, job): (u16, u32),
-        t: Ns,
+        (t, now): (Ns, Ns),
         mode: Mode,
         torque: &JointVector,
         program: &BusProgram,
         out: &mut Outputs,
     ) -> Ns {
         self.finite = torque.iter().all(|torque| torque.is_finite());
+        self.released = if mode == Mode::Free { None } else { self.released.or(Some(now)) };
         let rest = match self.rest {
             _ if mode == Mode::Free || !self.finite => Rest::Stop,
             None | Some(Rest::Stop) => Rest::Start,

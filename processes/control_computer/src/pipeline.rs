@@ -104,9 +104,15 @@ impl Pipeline {
         let arm = ArmState::new(&self.arm, &sensed.q, &sensed.qd);
         let tool = self.frame.kinematics(&arm.tip_motion());
         let mut job = self.outer.decide(now, dt, sensed, &tool, mode);
+        self.inverse.observe(&arm, &tool, &sensed.qd, &job.contact.fe, dt);
         (job.torque, job.torque_limited) = self.inverse.torque(&arm, &tool, &job.wanted(), mode);
         self.outer.carry_on(&job, &tool, mode, dt);
         job
+    }
+
+    /// The inverse dynamics, and the observer behind it.
+    pub fn inverse(&mut self) -> &mut InverseDynamics {
+        &mut self.inverse
     }
 
     /// One job of the first of two cards; `torque_limited` is what the second card has said last.

@@ -24,8 +24,12 @@ pub const COUNTER: usize = FORCES + 6;
 pub const ERRORS: usize = COUNTER + 1;
 /// Index of the drives' status.
 pub const STATUS: usize = ERRORS + 1;
+/// Index of the first encoder card's status.
+pub const CARDS: usize = STATUS + 1;
+/// Encoder cards.
+const ENCODER_CARDS: usize = JOINTS.div_ceil(encoder::CHANNELS_PER_CARD);
 /// Sensor registers in all.
-pub const READS: usize = STATUS + 1;
+pub const READS: usize = CARDS + ENCODER_CARDS;
 /// Processor time from the decision to the first write where nothing has to be computed (STO).
 const STOP_EXECUTION_NS: u64 = 20_000;
 
@@ -160,6 +164,10 @@ impl BusProgram {
         for axis in 0..6 {
             registers[FORCES + axis] = force_word(force::filter(filter) + 2 * axis as u32)?;
         }
+        for card in 0..ENCODER_CARDS {
+            let name = format!("encoder-{}", card + 1);
+            registers[CARDS + card] = register(&name, encoder::CARD_STATUS, Width::D32, read)?;
+        }
         registers[COUNTER] = force_word(force::counter(filter))?;
         registers[ERRORS] = force_word(force::ERRORS)?;
         let second = match scenario.second_control_task() {
@@ -176,7 +184,7 @@ impl BusProgram {
         };
         let sensors: Vec<usize> = match part {
             Part::Whole => (0..READS).collect(),
-            Part::Law => (0..STATUS).collect(),
+            Part::Law => (0..STATUS).chain(CARDS..READS).collect(),
             Part::Torque => (0..FORCES).chain([STATUS]).collect(),
         };
         let mut reads: Vec<Access> = sensors.iter().map(|&register| registers[register]).collect();

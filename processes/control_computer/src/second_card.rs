@@ -17,7 +17,10 @@ use arm::{ArmModel, ArmState, JointVector};
 use board::Outputs;
 use messages::{BusWord, Detector, Event, EventKind, Severity, TransferRecord};
 use scenario::Scenario;
-use vme::Ns;
+use vme::{MILLISECOND, Ns};
+
+/// Time in which released brakes let go, and the arm settles on its motors.
+pub const BRAKES_LET_GO: Ns = 200 * MILLISECOND;
 
 /// The second processor card.
 pub struct SecondCard {
@@ -30,7 +33,10 @@ pub struct SecondCard {
     frame: TaskFrame,
     inverse: InverseDynamics,
     findings: Findings,
-    max_missing: u32,
+    limits: scenario::Safety,
+    period_ns: Ns,
+    /// Own clock at the last job.
+    last: Option<Ns>,
     output: Output,
     ram: Ram,
     torque: JointVector,
@@ -49,7 +55,9 @@ impl SecondCard {
             frame: TaskFrame::new(&scenario.task_frame()),
             inverse: InverseDynamics::new(scenario)?,
             findings: Findings::new(),
-            max_missing: scenario.safety.max_held_jobs,
+            limits: scenario.safety.clone(),
+            period_ns: scenario.rack.tasks[usize::from(task)].period_ns,
+            last: None,
             output: Output::new(scenario)?,
             ram: Ram::new(),
             torque: JointVector::zeros(),
@@ -96,9 +104,13 @@ impl SecondCard {
 
     /// One job at its decision, at `t` of simulated time and `now` of the board's clock.
     pub fn job(&mut self, job: u32, t: Ns, now: Ns, out: &mut Outputs) {
-        if let Some(register) = self.sensors.read(job) {
+        let since = self.last.map_or(self.period_ns, |last| now.saturating_sub(last).max(1));
+        self.last = Some(now);
+        let dt = since as f64 * 1e-9;
+        if let Some(register) = self.sensors.read(job, dt) {
             let address = self.program.register_address(register).into();
-            out.mail.events.push(Event::new(t, EventKind::BusError, Severity::Warn, job.into(), address));
+            let event = Event::new(t, EventKind::BusError, Severity::Warn, job.into(), address);
+            out.mail.events.push(event.because(Some(Detector::BusError)));
         }
         let sensed = *self.sensors.sensed();
         let period = self.first.1;
@@ -113,11 +125,16 @@ impl SecondCard {
         let findings = &mut self.findings;
         findings.begin();
         self.sensors.report(findings);
+        self.sensors.report_brakes(now, self.output.released(), findings);
+        let (joint, share) = self.inverse.disturbed();
+        if self.limits.max_residual_share > 0.0 && share > self.limits.max_residual_share {
+            findings.report(Detector::TrackingResidual, State::Off, joint as f64);
+        }
         if let Some(wanted) = &wanted {
             findings.demand(wanted.demand, wanted.cause);
         }
         if missing > 0 {
-            let demand = if missing > self.max_missing { State::Stop } else { State::Degraded };
+            let demand = if missing > self.limits.max_held_jobs { State::Stop } else { State::Degraded };
             findings.report(Detector::HandOver, demand, missing.into());
         }
         let state = self.output.decide(t, now, findings, sensed.qd.amax(), acknowledge, out);
@@ -135,9 +152,13 @@ impl SecondCard {
             }
             let arm = ArmState::new(&self.arm, &sensed.q, &sensed.qd);
             let tool = self.frame.kinematics(&arm.tip_motion());
+            self.inverse.observe(&arm, &tool, &sensed.qd, &wanted.fe, dt);
             (self.torque, torque_limited) = self.inverse.torque(&arm, &tool, &wanted, mode);
         }
-        let written = self.output.write((self.task, job), t, mode, &self.torque, &self.program, out);
+        let released = self.output.released();
+        let acts = mode != Mode::Free && released.is_some_and(|since| now > since + BRAKES_LET_GO);
+        self.inverse.sent(&sensed.qd, acts.then_some(self.torque));
+        let written = self.output.write((self.task, job), (t, now), mode, &self.torque, &self.program, out);
         self.ram.show(written, Word { state, torque_limited });
     }
 }

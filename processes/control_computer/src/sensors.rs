@@ -5,7 +5,8 @@
 //! value has been held is counted, and the safety state machine decides what that means.
 
 use crate::findings::Findings;
-use crate::program::{COUNTER, COUNTS, ERRORS, FORCES, READS, STATUS, is_wide};
+use crate::force_noise::ForceNoise;
+use crate::program::{CARDS, COUNTER, COUNTS, ERRORS, FORCES, READS, STATUS, is_wide};
 use crate::safety::State;
 use arm::{JointVector, Spatial};
 use messages::registers::{encoder, force};
@@ -45,6 +46,8 @@ pub struct Sensors {
     registers: Vec<usize>,
     /// Bit i: word i came in this job and is valid.
     came: u32,
+    /// Of those that came, the words that cannot be true, and why.
+    refused: u32,
     job: u32,
     /// Jobs in a row in which word i did not come.
     held: [u32; READS],
@@ -62,9 +65,13 @@ pub struct Sensors {
     old_force_jobs: u32,
     same_force_jobs: u32,
     status: u32,
+    /// Status of the encoder cards in this job; 0 where it did not come.
+    cards: [u32; READS - CARDS],
     /// The receiver's error word in this job; 0 where it did not come.
     errors: u32,
     limits: scenario::Safety,
+    noise: ForceNoise,
+    force_begun: bool,
 }
 
 impl Sensors {
@@ -84,6 +91,7 @@ impl Sensors {
             words: [BusWord { t: 0, addr: 0, value: 0, job: 0, task: 0, index: 0 }; READS],
             registers: registers.to_vec(),
             came: 0,
+            refused: 0,
             job: 0,
             held: [0; READS],
             counts: std::array::from_fn(|i| (posture[i] * counts_per_rad[i]).floor() as i64),
@@ -99,8 +107,11 @@ impl Sensors {
             old_force_jobs: 0,
             same_force_jobs: 0,
             status: 0,
+            cards: [0; READS - CARDS],
             errors: 0,
             limits: scenario.safety.clone(),
+            noise: ForceNoise::new(),
+            force_begun: false,
         })
     }
 
@@ -115,8 +126,9 @@ impl Sensors {
         self.came |= 1 << index;
     }
 
-    /// Decodes the words of `job`. Returns the first register whose read has just failed, if any.
-    pub fn read(&mut self, job: u32) -> Option<usize> {
+    /// Decodes the words of `job`, which begins `period_s` after the one before. Returns the first register whose read has
+    /// just failed, if any.
+    pub fn read(&mut self, job: u32, period_s: f64) -> Option<usize> {
         let came = if self.job == job { self.came } else { 0 };
         self.came = came;
         self.errors = if self.has(ERRORS) { self.words[ERRORS].value } else { 0 };
@@ -125,17 +137,24 @@ impl Sensors {
         }
         let mut failed = None;
         for &index in &self.registers {
-            self.held[index] = if self.has(index) { 0 } else { self.held[index] + 1 };
-            if failed.is_none() && came & (1 << index) == 0 && self.held[index] == 1 {
+            if failed.is_none() && came & (1 << index) == 0 && self.held[index] == 0 {
                 failed = Some(index);
             }
         }
+        self.refused = 0;
         for joint in 0..JOINTS {
-            self.read_encoder(joint);
+            self.read_encoder(joint, period_s);
         }
         self.read_force();
         if self.has(STATUS) {
             self.status = self.words[STATUS].value;
+        }
+        for card in CARDS..READS {
+            self.cards[card - CARDS] = if self.has(card) { self.words[card].value } else { 0 };
+        }
+        for &index in &self.registers {
+            let taken = (self.came & !self.refused) >> index & 1 == 1;
+            self.held[index] = if taken { 0 } else { self.held[index].saturating_add(1) };
         }
         self.came = 0;
         failed
@@ -154,13 +173,35 @@ impl Sensors {
         }
         let tripped = self.status & drive_status::AMPLIFIER_TRIPPED;
         if tripped != 0 {
-            findings.report(Detector::AmplifierTrip, State::Off, tripped.trailing_zeros().into());
+            // the I/O card has taken the torque off that axis
+            findings.report(Detector::AmplifierTrip, State::Stop, tripped.trailing_zeros().into());
+        }
+        if self.status & drive_status::DA_FAULT != 0 {
+            findings.report(Detector::DaReadBack, State::Off, 0.0);
+        }
+        if self.status & drive_status::POWER_FAIL != 0 {
+            findings.report(Detector::PowerFail, State::Stop, 0.0);
+        }
+        for joint in 0..JOINTS {
+            let (card, channel) = (joint / encoder::CHANNELS_PER_CARD, joint % encoder::CHANNELS_PER_CARD);
+            let status = self.cards[card] >> (8 * channel);
+            for (bit, detector, demand) in [
+                (encoder::STATUS_LEVEL, Detector::EncoderLevel, State::Off),
+                (encoder::STATUS_QUADRATURE, Detector::EncoderQuadrature, State::Stop),
+                (encoder::STATUS_INDEX, Detector::EncoderIndex, State::Stop),
+            ] {
+                if status & bit != 0 {
+                    findings.report(detector, demand, joint as f64);
+                }
+            }
         }
         for &index in &self.registers {
             let held = self.held[index];
             if held > 0 {
-                let demand = if held > limits.max_held_jobs { State::Stop } else { State::Degraded };
-                findings.report(self.why_held(index), demand, index as f64);
+                let detector = self.why_held(index);
+                let stop = if detector == Detector::ForceSlew { State::Hold } else { State::Stop };
+                let demand = if held > limits.max_held_jobs { stop } else { State::Degraded };
+                findings.report(detector, demand, index as f64);
             }
         }
         if self.old_force_jobs > 0 {
@@ -170,11 +211,31 @@ impl Sensors {
         if limits.max_same_force_jobs > 0 && self.same_force_jobs > limits.max_same_force_jobs {
             findings.report(Detector::ForceFrozen, State::Hold, self.same_force_jobs.into());
         }
+        let noise = self.noise.deviation_n();
+        if limits.max_force_noise_n > 0.0 && noise > limits.max_force_noise_n {
+            findings.report(Detector::ForceVariance, State::Hold, noise);
+        }
+    }
+
+    /// What the brakes' contacts say of the job before, in which they were to be released since `released`, or engaged.
+    pub fn report_brakes(&self, now: Ns, released: Option<Ns>, findings: &mut Findings) {
+        let engaged = (self.status & drive_status::BRAKE_ENGAGED) >> 16;
+        for joint in (0..JOINTS).filter(|joint| engaged >> joint & 1 == 1) {
+            let slips = self.sensed.qd[joint].abs() > self.limits.max_braked_speed_rad_per_s;
+            let late = nanoseconds(self.limits.max_brake_time_ms * 1e-3);
+            let stuck = released.is_some_and(|released| now > released + late);
+            if slips || stuck {
+                findings.report(Detector::BrakeMotion, State::Off, joint as f64);
+            }
+        }
     }
 
     /// Why the word that is held was not taken.
     fn why_held(&self, index: usize) -> Detector {
         let invalid = self.errors & FORCE_INVALID;
+        if self.refused >> index & 1 == 1 {
+            return if index < FORCES { Detector::EncoderJump } else { Detector::ForceSlew };
+        }
         match 1 << index & FORCE_WORDS != 0 && invalid != 0 {
             true if invalid & !u32::from(force::ERROR_SATURATED) == 0 => Detector::ForceFullScale,
             true => Detector::ForceErrorWord,
@@ -197,33 +258,47 @@ impl Sensors {
         self.came & (1 << index) != 0
     }
 
-    fn read_encoder(&mut self, joint: usize) {
+    fn read_encoder(&mut self, joint: usize, period_s: f64) {
         let at = COUNTS + 2 * joint;
+        if self.has(at + 1) {
+            let counts_per_s = f64::from(self.words[at + 1].value as i32) * encoder::VELOCITY_LSB;
+            self.sensed.qd[joint] = counts_per_s / self.counts_per_rad[joint];
+        }
         if self.has(at) {
             let word = &self.words[at];
             let unused = 32 - self.counter_bits;
             // difference to the last reading, sign-extended from the counter's width
             let turned = (word.value.wrapping_sub(self.counts[joint] as u32) << unused) as i32;
-            self.counts[joint] += i64::from(turned >> unused);
+            let turned = i64::from(turned >> unused);
+            if self.jumps(joint, turned, period_s) {
+                self.refused |= 1 << at;
+                return;
+            }
+            self.counts[joint] += turned;
             self.counts_at[joint] = word.t;
             self.sensed.q[joint] = self.counts[joint] as f64 / self.counts_per_rad[joint];
         }
-        if self.has(at + 1) {
-            let counts_per_s = f64::from(self.words[at + 1].value as i32) * encoder::VELOCITY_LSB;
-            self.sensed.qd[joint] = counts_per_s / self.counts_per_rad[joint];
-        }
+    }
+
+    /// Whether a joint cannot have turned by so many counts since its last count was taken.
+    fn jumps(&self, joint: usize, turned: i64, period_s: f64) -> bool {
+        let limit = self.limits.max_count_jump_rad;
+        let expected = self.sensed.qd[joint] * period_s * f64::from(self.held[COUNTS + 2 * joint] + 1);
+        limit > 0.0 && (turned as f64 / self.counts_per_rad[joint] - expected).abs() > limit
     }
 
     fn read_force(&mut self) {
         let before = self.sensed.wrench;
+        let mut wrench = before;
         for axis in 0..6 {
             let at = FORCES + axis;
             if self.has(at) {
                 let value = self.words[at].value;
                 let counts = if self.wide_force { f64::from(value as i32) } else { f64::from(value as u16 as i16) };
-                self.sensed.wrench[axis] = counts * self.force_scale[axis];
+                wrench[axis] = counts * self.force_scale[axis];
             }
         }
+        self.take_force(wrench);
         if self.has(COUNTER) {
             let word = &self.words[COUNTER];
             let newest = word.t / self.force_period_ns;
@@ -233,8 +308,25 @@ impl Sensors {
             count(&mut self.old_force_jobs, old);
         }
         if self.came & FORCE_WORDS == FORCE_WORDS {
-            count(&mut self.same_force_jobs, self.sensed.wrench == before);
+            count(&mut self.same_force_jobs, wrench == before);
         }
+    }
+
+    /// Takes a wrench that a contact can have caused. After more refused ones than may be held it is the new truth, and the
+    /// arm is held by then.
+    fn take_force(&mut self, wrench: Spatial) {
+        let slew = self.limits.max_force_slew_n;
+        let change = wrench - self.sensed.wrench;
+        let leaps = (0..6).any(|axis| change[axis].abs() > if axis < 3 { slew } else { 0.1 * slew });
+        if slew > 0.0 && self.force_begun && leaps && self.held[FORCES] <= self.limits.max_held_jobs {
+            self.refused |= self.came & FORCE_WORDS;
+            return;
+        }
+        if self.came & FORCE_WORDS == FORCE_WORDS {
+            self.force_begun = true;
+            self.noise.push(&wrench);
+        }
+        self.sensed.wrench = wrench;
     }
 }
 
@@ -284,7 +376,7 @@ mod tests {
 
     #[test]
     fn counters_are_unwrapped_both_ways_from_the_posture_that_homing_left() {
-        let scenario = scenario(&[]);
+        let scenario = scenario(&["safety.max_count_jump_rad=0.0"]);
         let mut sensors = all(&scenario);
         let mut counts = sensors.counts;
         // 24 bits wrap every 2²⁴ counts: go round twice forwards, then back
@@ -292,7 +384,7 @@ mod tests {
             let way = if job < 50 { 700_000 } else { -1_400_000 };
             counts = counts.map(|count| count + way);
             give(&mut sensors, job, counts, 1000);
-            assert_eq!(sensors.read(job), None);
+            assert_eq!(sensors.read(job, 5e-3), None);
             for (joint, &count) in counts.iter().enumerate() {
                 let q = count as f64 / sensors.counts_per_rad[joint];
                 assert_eq!(sensors.sensed().q[joint], q);
@@ -310,7 +402,7 @@ mod tests {
         sensors.take(&word(0, COUNTS + 3, (-2048i32) as u32, 0));
         sensors.take(&word(0, FORCES + 2, u32::from((-8192i16) as u16), 0));
         sensors.take(&word(0, FORCES + 5, 4096, 0));
-        sensors.read(0);
+        sensors.read(0, 5e-3);
         let sensed = sensors.sensed();
         assert_eq!(sensed.qd[1], -2.0 / sensors.counts_per_rad[1]);
         // full scales 400 N and 40 Nm at 16384 counts
@@ -322,7 +414,7 @@ mod tests {
         let mut sensors = all(&scenario(&[]));
         let counts = sensors.counts;
         give(&mut sensors, 0, counts.map(|c| c + 10), 0);
-        assert_eq!((sensors.read(0), demanded(&sensors).0), (None, State::Run));
+        assert_eq!((sensors.read(0, 5e-3), demanded(&sensors).0), (None, State::Run));
         let before = *sensors.sensed();
         for job in 1..=3 {
             for index in (0..READS).filter(|&index| index != COUNTS + 4) {
@@ -331,21 +423,21 @@ mod tests {
                 sensors.take(&word(job, index, value, 0));
             }
             // only the first miss in a row is news
-            let failed = sensors.read(job);
+            let failed = sensors.read(job, 5e-3);
             assert_eq!(failed, (job == 1).then_some(COUNTS + 4));
             assert_eq!(demanded(&sensors), (State::Degraded, Some(Detector::BusError)));
             assert_eq!(sensors.sensed().q[2], before.q[2]);
         }
         give(&mut sensors, 5, counts, 0);
-        sensors.read(4);
+        sensors.read(4, 5e-3);
         assert_eq!(demanded(&sensors).0, State::Stop, "nothing came in job 4");
         give(&mut sensors, 6, counts, 0);
-        assert_eq!((sensors.read(6), demanded(&sensors).0), (None, State::Run));
+        assert_eq!((sensors.read(6, 5e-3), demanded(&sensors).0), (None, State::Run));
     }
 
     #[test]
     fn under_a_receiver_error_or_saturation_the_force_is_held() {
-        let mut sensors = all(&scenario(&[]));
+        let mut sensors = all(&scenario(&["safety.max_force_slew_n=0.0"]));
         let counts = sensors.counts;
         let why = |detector| (State::Degraded, Some(detector));
         for (job, errors, force, expected) in [
@@ -359,7 +451,7 @@ mod tests {
             let newtons = f64::from(job) * 100.0 / 3.0 * 2.0 + 100.0;
             sensors.take(&word(job, FORCES, (newtons / 400.0 * 16384.0) as u32, 0));
             sensors.take(&word(job, ERRORS, errors, 0));
-            sensors.read(job);
+            sensors.read(job, 5e-3);
             assert!((sensors.sensed().wrench[0] - force).abs() < 0.05, "{job}");
             assert_eq!(demanded(&sensors), expected);
         }
@@ -376,9 +468,92 @@ mod tests {
             give(&mut sensors, job as u32, counts, t);
             let counter = (published / 32_000_000) as u16;
             sensors.take(&word(job as u32, COUNTER, counter.into(), t));
-            sensors.read(job as u32);
+            sensors.read(job as u32, 5e-3);
             assert_eq!(sensors.force_age(t + 1000), t + 1000 - published);
             assert_eq!(sensors.encoder_age(t + 1000), 1000);
         }
+    }
+
+    #[test]
+    fn a_count_that_jumps_further_than_the_joint_can_turn_is_refused_until_the_arm_is_stopped() {
+        let mut sensors = all(&scenario(&[]));
+        let counts = sensors.counts;
+        give(&mut sensors, 0, counts, 0);
+        sensors.read(0, 5e-3);
+        let before = sensors.sensed().q[2];
+        // 3 mrad where the joint stands still
+        let mut jumped = counts;
+        jumped[2] += (3e-3 * sensors.counts_per_rad[2]) as i64;
+        for job in 1..=4 {
+            give(&mut sensors, job, jumped, 0);
+            assert_eq!(sensors.read(job, 5e-3), None);
+            let state = if job == 4 { State::Stop } else { State::Degraded };
+            assert_eq!(demanded(&sensors), (state, Some(Detector::EncoderJump)), "{job}");
+            assert_eq!(sensors.sensed().q[2], before);
+        }
+    }
+
+    #[test]
+    fn a_force_that_changes_faster_than_a_contact_is_refused_then_holds_the_arm_and_is_taken() {
+        let mut sensors = all(&scenario(&[]));
+        let counts = sensors.counts;
+        let feed = |sensors: &mut Sensors, job: u32, newtons: f64| {
+            give(sensors, job, counts, 0);
+            sensors.take(&word(job, FORCES + 2, (newtons / 400.0 * 16384.0) as u32, 0));
+            sensors.read(job, 5e-3);
+            (sensors.sensed().wrench[2].round(), demanded(sensors))
+        };
+        assert_eq!(feed(&mut sensors, 0, 20.0), (20.0, (State::Run, None)));
+        let refused = |state| (state, Some(Detector::ForceSlew));
+        assert_eq!(feed(&mut sensors, 1, 150.0), (20.0, refused(State::Degraded)));
+        assert_eq!(feed(&mut sensors, 2, 30.0), (30.0, (State::Run, None)), "one spike");
+        for job in 3..=5 {
+            assert_eq!(feed(&mut sensors, job, 150.0), (30.0, refused(State::Degraded)));
+        }
+        assert_eq!(feed(&mut sensors, 6, 150.0), (30.0, refused(State::Hold)));
+        assert_eq!(feed(&mut sensors, 7, 150.0).0, 150.0);
+    }
+
+    #[test]
+    fn what_the_cards_and_drives_signal_is_demanded_as_their_kind_asks() {
+        for (index, value, demand, detector) in [
+            (STATUS, 1 << 3, State::Stop, Detector::AmplifierTrip),
+            (STATUS, drive_status::DA_FAULT, State::Off, Detector::DaReadBack),
+            (STATUS, drive_status::POWER_FAIL, State::Stop, Detector::PowerFail),
+            (STATUS, drive_status::EMERGENCY_STOP, State::Off, Detector::EmergencyStop),
+            (CARDS + 1, encoder::STATUS_LEVEL << 8, State::Off, Detector::EncoderLevel),
+            (CARDS, encoder::STATUS_QUADRATURE, State::Stop, Detector::EncoderQuadrature),
+            (CARDS + 3, encoder::STATUS_INDEX, State::Stop, Detector::EncoderIndex),
+        ] {
+            let mut sensors = all(&scenario(&[]));
+            let counts = sensors.counts;
+            give(&mut sensors, 0, counts, 0);
+            sensors.take(&word(0, index, value, 0));
+            sensors.read(0, 5e-3);
+            assert_eq!(demanded(&sensors), (demand, Some(detector)));
+        }
+    }
+
+    #[test]
+    fn a_joint_that_moves_on_its_brake_or_stays_on_it_takes_the_torque_off() {
+        let mut sensors = all(&scenario(&[]));
+        let counts = sensors.counts;
+        let brakes = |sensors: &Sensors, now, released| {
+            let mut findings = Findings::new();
+            sensors.report_brakes(now, released, &mut findings);
+            findings.demanded().0
+        };
+        give(&mut sensors, 0, counts, 0);
+        sensors.take(&word(0, STATUS, 1 << (16 + 2), 0));
+        sensors.read(0, 5e-3);
+        assert_eq!(brakes(&sensors, 70_000_000, None), State::Run, "engaged and at rest");
+        assert_eq!(brakes(&sensors, 70_000_000, Some(20_000_000)), State::Run, "not yet");
+        assert_eq!(brakes(&sensors, 70_000_000, Some(5_000_000)), State::Off, "stuck");
+        let speed = 0.03 * sensors.counts_per_rad[2] / encoder::VELOCITY_LSB;
+        give(&mut sensors, 1, counts, 0);
+        sensors.take(&word(1, STATUS, 1 << (16 + 2), 0));
+        sensors.take(&word(1, COUNTS + 5, speed as u32, 0));
+        sensors.read(1, 5e-3);
+        assert_eq!(brakes(&sensors, 70_000_000, None), State::Off, "slips");
     }
 }

@@ -8,12 +8,17 @@ use crate::ahic::Impedance;
 use crate::frame::{Motion, angular, difference, linear};
 use arm::{Pose, rotation};
 use messages::PathKind;
+use nalgebra::Vector3;
 use vme::Ns;
 
 /// Segments that can wait.
 pub const QUEUE: usize = 32;
 /// Share of the move time in which a line's speed rises, and again in which it falls.
 const BLEND: f64 = 0.2;
+/// Greatest speed of a line, as a multiple of the mean one.
+pub const LINE_PEAK: f64 = 1.0 / (1.0 - BLEND);
+/// Greatest speed from point to point, as a multiple of the mean one.
+pub const QUINTIC_PEAK: f64 = 1.875;
 
 /// One segment, checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,6 +71,13 @@ impl Trajectory {
     /// Whether another segment can wait.
     pub fn has_room(&self) -> bool {
         self.waiting < QUEUE
+    }
+
+    /// Where the desired position will be at the end of the last segment known.
+    pub fn last_target(&self) -> Vector3<f64> {
+        let waiting = (0..self.waiting).rev().map(|n| self.queue[(self.first + n) % QUEUE]);
+        let mut moving = waiting.chain([self.active]).flatten().filter(|segment| segment.path != PathKind::Hold);
+        moving.next().map_or(self.from.p, |segment| segment.target.p)
     }
 
     /// Start of the last segment known, ns.

@@ -47,7 +47,7 @@ fn the_first_card_reads_the_seconds_state_and_writes_the_hand_over_block_into_it
     let mut rig = Rig::new(split());
     let ram = rig.address("cpu-2-dpram", 0);
     let state = rig.reads.last().unwrap();
-    assert_eq!((rig.reads.len(), state.addr, state.dir), (23, ram + mailbox::STATE, Direction::Read));
+    assert_eq!((rig.reads.len(), state.addr, state.dir), (27, ram + mailbox::STATE, Direction::Read));
     rig.run();
     let block = accesses(&rig.rest);
     // 20 doubles, and four longwords: job, demand, cause, acknowledgement

@@ -4,12 +4,12 @@
 //! and a margin. A state block that did not come (the bus or the link failed) leaves everything as it is until the next.
 
 use crate::commands;
-use crate::sender::Sender;
+use crate::sender::{Poll, Sender};
 use board::{Board, Inputs, Outputs};
 use messages::registers::mailbox;
-use messages::{Command, Event, EventKind, Severity, Telemetry};
-use scenario::Scenario;
-use vme::{Access, Direction, MILLISECOND, Ns, Op, Width};
+use messages::{BoardId, Command, Event, EventKind, Severity, Telemetry};
+use scenario::{FaultKind, Progress, Scenario, Schedule, Site};
+use vme::{Access, Direction, MILLISECOND, Ns, Op, Program, Width};
 
 /// How much earlier than two polls ahead a command is sent.
 const MARGIN: Ns = 50 * MILLISECOND;
@@ -20,6 +20,10 @@ pub struct Workstation {
     /// Address modifier and base of the control computer's dual-ported RAM.
     mailbox: (u8, u32),
     sender: Sender,
+    schedule: Schedule,
+    progress: Progress,
+    /// Its program has ended.
+    gone: bool,
     /// Epoch accepted last, as the state block of this job says.
     accepted: Option<u32>,
     /// Blocks that the last job wrote.
@@ -43,6 +47,9 @@ impl Workstation {
             task,
             mailbox: (ram.am, ram.base),
             sender: Sender::new(commands::of(scenario), 2 * period + MARGIN),
+            schedule: Schedule::new(scenario, |site| site == Site::Board(BoardId::Workstation)),
+            progress: Progress::default(),
+            gone: false,
             accepted: None,
             written: 0,
         })
@@ -60,14 +67,43 @@ impl Workstation {
         })
     }
 
+    /// Faults that have begun or ended by `now`. Returns the command that is sent once too often.
+    fn go_wrong(&mut self, now: Ns, out: &mut Outputs) -> Option<Command> {
+        let Self { schedule, progress, sender, .. } = self;
+        let mut stale = None;
+        schedule.advance(progress, now, |place, _| {
+            let entry = &schedule.entries()[place];
+            match entry.fault.kind {
+                FaultKind::StaleCommand => stale = sender.newest_sent(),
+                FaultKind::WrongCommand => sender.interpose(now, entry.fault.amount),
+                _ => {}
+            }
+            let number = entry.number as f64;
+            out.mail.events.push(Event::new(now, EventKind::FaultInjected, Severity::Warn, number, 0.0));
+        });
+        let gone = schedule.holding(progress).any(|(_, entry)| entry.fault.kind == FaultKind::Gone);
+        if gone != self.gone {
+            self.gone = gone;
+            out.programs.push((self.task, if gone { vec![Op::Decide] } else { self.program() }));
+        }
+        stale
+    }
+
+    /// A console job up to its decision.
+    fn program(&self) -> Program {
+        vec![self.block(Direction::Read, mailbox::TELEMETRY, size_of::<Telemetry>()), Op::Decide]
+    }
+
     fn decide(&mut self, now: Ns, out: &mut Outputs) {
-        let poll = self.sender.poll(now, self.accepted.take());
+        let stale = self.go_wrong(now, out);
+        let accepted = self.accepted.take();
+        let poll = if self.gone { Poll::default() } else { self.sender.poll(now, accepted) };
         let (first, end) = poll.send;
-        out.mail
-            .commands
-            .extend_from_slice(&self.sender.commands()[first..end]);
-        if end - first != self.written {
-            self.written = end - first;
+        out.mail.commands.extend_from_slice(&self.sender.commands()[first..end]);
+        out.mail.commands.extend(stale);
+        let blocks = out.mail.commands.len();
+        if blocks != self.written {
+            self.written = blocks;
             let write = self.block(Direction::Write, mailbox::COMMAND, size_of::<Command>());
             out.rest = Some(vec![write; self.written]);
         }
@@ -86,8 +122,7 @@ impl Workstation {
 impl Board for Workstation {
     fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
         if inputs.boot {
-            let read = self.block(Direction::Read, mailbox::TELEMETRY, size_of::<Telemetry>());
-            out.programs.push((self.task, vec![read, Op::Decide]));
+            out.programs.push((self.task, self.program()));
         }
         if let Some(telemetry) = inputs.mail.telemetry.last() {
             self.accepted = Some(telemetry.epoch);

@@ -4,7 +4,7 @@
 //! accepted last; what is still missing there after [`PATIENCE`] polls is sent again under the same epoch (the receiver
 //! knows a repetition by it). After [`SENDINGS`] times a command is given up and the next ones take their turn.
 
-use messages::Command;
+use messages::{Command, PathKind};
 use vme::Ns;
 
 /// Polls that show a command as not accepted before it is sent again.
@@ -88,6 +88,22 @@ impl Sender {
         }
         poll.send = (first, self.sent);
         poll
+    }
+
+    /// The newest command sent so far.
+    pub fn newest_sent(&self) -> Option<Command> {
+        self.sent.checked_sub(1).map(|last| self.commands[last])
+    }
+
+    /// Sends a command that nobody meant, as the next one: the tool is to jump by `step` (m) into the surface at once, where
+    /// the newest segment sent put it. Those that follow it count on from it.
+    pub fn interpose(&mut self, now: Ns, step: f64) {
+        let Some(model) = self.newest_sent().or(self.commands.first().copied()) else { return };
+        let mut wrong = Command { path: PathKind::Step as u32, start: now, end: now + 1_000_000_000, move_time: 0, ..model };
+        wrong.position[2] += step;
+        wrong.epoch = self.sent as u32 + 1;
+        self.commands.insert(self.sent, wrong);
+        self.commands[self.sent + 1..].iter_mut().for_each(|command| command.epoch += 1);
     }
 
     fn settle(&mut self, settled: usize) {

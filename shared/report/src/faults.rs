@@ -3,7 +3,7 @@
 //! A fault's time runs from its injection to the next one's, or to the end of the run.
 
 use crate::trace::{Trace, seconds};
-use messages::{Event, EventKind};
+use messages::{Detector, Event, EventKind};
 use scenario::Scenario;
 use serde::Serialize;
 
@@ -31,10 +31,12 @@ pub struct FaultRow {
     pub stopping_after_s: Option<f64>,
     /// Gravest state of the control computer.
     pub reaction: String,
-    /// Greatest contact force, N, and the one at its begin.
+    /// Greatest contact force, N.
     pub peak_force_n: f64,
     /// Contact force at its begin, N.
     pub force_before_n: f64,
+    /// Greatest motor torque, as a share of its drive's limit.
+    pub peak_torque_share: f64,
     /// Greatest distance of the tool from where it was at its begin, m.
     pub distance_m: f64,
 }
@@ -54,9 +56,8 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
     let within = |t: vme::Ns| (from..end).contains(&t);
     let after = |event: &Event| seconds(event.t) - seconds(from);
     let consequence = |event: &&Event| {
-        let state = event.kind == EventKind::SafetyState as u32 && event.b > event.a;
-        let seen = [EventKind::BusError, EventKind::ForceSaturated, EventKind::WatchdogExpired, EventKind::OverrunTrip];
-        within(event.t) && (state || seen.iter().any(|kind| event.kind == *kind as u32))
+        let seen = [EventKind::WatchdogExpired, EventKind::AmplifierTrip, EventKind::OverrunTrip];
+        within(event.t) && (event.cause != 0 || seen.iter().any(|kind| event.kind == *kind as u32))
     };
     let first = trace.events.iter().find(consequence);
     let states = trace.events.iter().filter(|event| event.kind == EventKind::SafetyState as u32 && within(event.t));
@@ -70,27 +71,46 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
         let moved: [f64; 3] = std::array::from_fn(|i| probe.position[i] - before.position[i]);
         size(&moved)
     };
-    let (peak_force_n, distance_m) = probes.fold((0.0f64, 0.0f64), |(peak, distance), probe| {
-        (peak.max(force(probe)), distance.max(way(probe)))
-    });
+    let limits = scenario.drives().ok()?.each(|drive| drive.torque_limit_nm);
+    let torque = |probe: &messages::PlantProbe| {
+        (0..messages::JOINTS).map(|i| probe.motor_torque[i].abs() / limits[i]).fold(0.0f64, f64::max)
+    };
+    let (mut peak_force_n, mut peak_torque_share, mut distance_m) = (0.0f64, 0.0f64, 0.0f64);
+    for probe in probes {
+        peak_force_n = peak_force_n.max(force(probe));
+        peak_torque_share = peak_torque_share.max(torque(probe));
+        distance_m = distance_m.max(way(probe));
+    }
     Some(FaultRow {
         fault,
         target: stated.target.clone(),
         kind: stated.kind.name().into(),
         injected_s: seconds(from),
         detected_after_s: first.map(after),
-        detected_by: first.and_then(|event| EventKind::from_number(event.kind)).map(|kind| kind.name().into()),
+        detected_by: first.and_then(detector),
         stopping_after_s: stopping.map(after),
         reaction: STATES.get(gravest.unwrap_or(0)).copied().unwrap_or("unknown").into(),
         peak_force_n,
         force_before_n: force(before),
+        peak_torque_share,
         distance_m,
     })
 }
 
+/// What an event was detected by: the detector, or what such an event itself is.
+fn detector(event: &Event) -> Option<String> {
+    let of_kind = match EventKind::from_number(event.kind)? {
+        EventKind::WatchdogExpired => Some(Detector::OutputWatchdog),
+        EventKind::AmplifierTrip => Some(Detector::AmplifierTrip),
+        EventKind::OverrunTrip => Some(Detector::Overrun),
+        _ => None,
+    };
+    Detector::from_number(event.cause).or(of_kind).map(|detector| detector.name().into())
+}
+
 /// Headings of the fault table.
-pub(crate) const HEADINGS: [&str; 8] =
-    ["fault", "at s", "detected by", "after ms", "stopping after ms", "reaction", "force before, peak N", "moved mm"];
+pub(crate) const HEADINGS: [&str; 9] =
+    ["fault", "at s", "detected by", "after ms", "stopping after ms", "reaction", "force before, peak N", "peak torque %", "moved mm"];
 
 /// Cells of the fault table.
 pub(crate) fn cells(rows: &[FaultRow]) -> Vec<Vec<String>> {
@@ -104,6 +124,7 @@ pub(crate) fn cells(rows: &[FaultRow]) -> Vec<Vec<String>> {
             ms(row.stopping_after_s),
             row.reaction.clone(),
             format!("{:.1}, {:.1}", row.force_before_n, row.peak_force_n),
+            format!("{:.0}", 1e2 * row.peak_torque_share),
             format!("{:.2}", 1e3 * row.distance_m),
         ]
     };

@@ -18,8 +18,22 @@ pub(crate) fn check(scenario: &Scenario) -> Result {
     holes(scenario)?;
     rack(scenario)?;
     crate::faults::check(scenario)?;
-    within("safety.max_force_age_ms", scenario.safety.max_force_age_ms, 0.0..=10_000.0, "0 to 10000")?;
-    within("safety.stop_time_ms", scenario.safety.stop_time_ms, 0.0..=10_000.0, "0 to 10000")?;
+    let safety = &scenario.safety;
+    for (key, value, most) in [
+        ("max_force_age_ms", safety.max_force_age_ms, 1e4),
+        ("max_force_slew_n", safety.max_force_slew_n, 1e6),
+        ("max_force_noise_n", safety.max_force_noise_n, 1e6),
+        ("max_free_force_n", safety.max_free_force_n, 1e6),
+        ("max_count_jump_rad", safety.max_count_jump_rad, 10.0),
+        ("max_residual_share", safety.max_residual_share, 100.0),
+        ("max_braked_speed_rad_per_s", safety.max_braked_speed_rad_per_s, 100.0),
+        ("max_brake_time_ms", safety.max_brake_time_ms, 1e4),
+        ("max_command_step_m", safety.max_command_step_m, 100.0),
+        ("max_command_speed_m_per_s", safety.max_command_speed_m_per_s, 100.0),
+        ("stop_time_ms", safety.stop_time_ms, 1e4),
+    ] {
+        within(&format!("safety.{key}"), value, 0.0..=most, &format!("0 to {most}"))?;
+    }
     processes(scenario)?;
     realtime(scenario)?;
     variants_and_limits(scenario)?;

@@ -1,0 +1,97 @@
+//! Disturbance observer: the joint torques that the model, the measured motion and the measured force do not account for.
+//!
+//! τ − [M(q) q̈ + h(q, q̇) + Jᵀ F_e], with q̈ from the joint speeds of two jobs and τ what the first of them sent, filtered
+//! over [`FILTER_S`]. Friction is part of it, and so are a force sensor that lies, a converter that drifts, a joint that
+//! hits something.
+
+use crate::frame::TaskKinematics;
+use crate::inverse_dynamics::{contact_torque, motion_torque};
+use crate::inverse_dynamics::Drives;
+use arm::{ArmState, JointVector, Spatial};
+
+/// Time constant of the filter, s.
+const FILTER_S: f64 = 0.02;
+
+/// What is kept from job to job.
+#[derive(Clone, Debug)]
+pub struct Disturbance {
+    /// Joint speeds of the job before and the torques that it sent; none where no torque was on.
+    before: Option<(JointVector, JointVector)>,
+    /// Filtered estimate, Nm.
+    estimate: JointVector,
+}
+
+impl Disturbance {
+    /// Nothing known.
+    pub fn new() -> Disturbance {
+        Disturbance { before: None, estimate: JointVector::zeros() }
+    }
+
+    /// The torques of the job before acted for `dt` seconds and led to the motion `arm` with joint speeds `qd`, under the
+    /// measured wrench `fe` (N, Nm).
+    pub fn observe(
+        &mut self,
+        drives: &Drives,
+        arm: &ArmState,
+        tool: &TaskKinematics,
+        qd: &JointVector,
+        fe: &Spatial,
+        dt: f64,
+    ) {
+        let Some((speed, torque)) = self.before else {
+            self.estimate = JointVector::zeros();
+            return;
+        };
+        let acceleration = (qd - speed) / dt;
+        let unaccounted = torque - motion_torque(arm, drives, &acceleration) - contact_torque(tool, fe);
+        self.estimate += (unaccounted - self.estimate) * (dt / (dt + FILTER_S));
+    }
+
+    /// This job sends these torques at these joint speeds; none: the drives are off, or their brakes not yet released.
+    pub fn sent(&mut self, qd: &JointVector, torque: Option<JointVector>) {
+        self.before = torque.map(|torque| (*qd, torque));
+    }
+
+    /// The joint whose torque is the greatest share of its drive's limit, and that share.
+    pub fn greatest(&self, drives: &Drives) -> (usize, f64) {
+        let share = self.estimate.component_div(&drives.torque_limit).abs();
+        let joint = share.imax();
+        (joint, share[joint])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::TaskFrame;
+    use arm::drives::DriveData;
+    use arm::{ArmModel, Pose, aba};
+
+    #[test]
+    fn a_sound_arm_shows_nothing_and_a_torque_that_does_not_arrive_shows_whole() {
+        let model = ArmModel::rediestro();
+        let drives = Drives::new(&DriveData::rediestro(), 0.0);
+        // base axes as task axes, so that the wrench is the same in both
+        let frame = TaskFrame::new(&Pose { p: nalgebra::Vector3::zeros(), r: nalgebra::Matrix3::identity() });
+        let fe = Spatial::new(2.0, -4.0, 30.0, 0.3, 0.1, -0.2);
+        let q = JointVector::from([0.3, -0.4, 0.9, -1.2, 0.5, 0.7, -0.2]);
+        let qd = JointVector::repeat(0.1);
+        let sent = JointVector::from([5.0, -60.0, -10.0, 70.0, 15.0, -5.0, 0.2]);
+        let dt = 1e-3;
+        for (lost, joint) in [(0.0, 0), (25.0, 3)] {
+            let mut acting = sent;
+            acting[joint] -= lost;
+            let qdd = aba(&model, &q, &qd, &acting, &drives.rotor_inertia, &-fe);
+            let arm = ArmState::new(&model, &q, &qd);
+            let tool = frame.kinematics(&arm.tip_motion());
+            let mut disturbance = Disturbance::new();
+            for _ in 0..400 {
+                disturbance.sent(&(qd - qdd * dt), Some(sent));
+                disturbance.observe(&drives, &arm, &tool, &qd, &fe, dt);
+            }
+            let (found, share) = disturbance.greatest(&drives);
+            assert!((share - lost / drives.torque_limit[joint]).abs() < 1e-6, "{share}");
+            assert!(lost == 0.0 || found == joint);
+        }
+    }
+}

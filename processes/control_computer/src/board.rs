@@ -12,7 +12,7 @@ use crate::output::Output;
 use crate::pipeline::{Job, Mode, Pipeline};
 use crate::program::{BusProgram, Part, Rest};
 use crate::safety::State;
-use crate::second_card::{BRAKES_LET_GO, SecondCard};
+use crate::second_card::SecondCard;
 use crate::sensors::Sensors;
 use board::{Board, Inputs, Outputs};
 use messages::{Command, CommandKind, ControlProbe, Detector, Event, EventKind, Severity, Telemetry, TransferRecord, limits};
@@ -159,7 +159,10 @@ impl ControlComputer {
                 if self.hold || self.state > State::Degraded {
                     return Err(Refusal::State);
                 }
-                commands::check_motion(&segment, &trajectory.last_target(), &self.limits)?;
+                // before the first job nobody knows where the tool is
+                if self.last.is_some() {
+                    commands::check_motion(&segment, &trajectory.last_target(), &self.limits)?;
+                }
                 if segment.start < trajectory.last_start() {
                     return Err(Refusal::Times);
                 }
@@ -201,8 +204,8 @@ impl ControlComputer {
             End::Drives(output) => {
                 let done = self.pipeline.step(now, dt, sensed, mode);
                 let written = output.write((self.task, job), (t, now), mode, &done.torque, &self.program, out);
-                let acts = output.released().is_some_and(|since| now > since + BRAKES_LET_GO);
-                self.pipeline.inverse().sent(&sensed.qd, acts.then_some(done.torque));
+                let torque = (mode != Mode::Free && output.carries(now)).then_some(done.torque);
+                self.pipeline.inverse().sent(&sensed.qd, torque);
                 (done, written)
             }
             End::SecondCard { card, told } => {
@@ -258,7 +261,7 @@ impl ControlComputer {
             findings.report(Detector::Overrun, if stop { State::Stop } else { State::Degraded }, lost.into());
         }
         if let End::Drives(output) = &self.end {
-            self.sensors.report_brakes(now, output.released(), findings);
+            self.sensors.report_brakes(now, output.brakes(), findings);
             let (joint, share) = self.pipeline.inverse().disturbed();
             if limits.max_residual_share > 0.0 && share > limits.max_residual_share {
                 findings.report(Detector::TrackingResidual, State::Off, joint as f64);

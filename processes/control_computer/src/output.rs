@@ -10,7 +10,34 @@ use arm::JointVector;
 use board::Outputs;
 use messages::{Detector, Event, EventKind, JOINTS, Severity};
 use scenario::Scenario;
-use vme::Ns;
+use vme::{MILLISECOND, Ns};
+
+/// Time in which released brakes let go, and the arm settles on its motors.
+const BRAKES_LET_GO: Ns = 200 * MILLISECOND;
+
+/// What has been asked of all brakes, and since when, own clock. Brakes are released with the drives on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Brakes {
+    /// To hold.
+    Engaged {
+        /// Since this instant, ns.
+        since: Ns,
+    },
+    /// To let go.
+    Released {
+        /// Since this instant, ns.
+        since: Ns,
+    },
+}
+
+impl Brakes {
+    /// Since when, ns.
+    pub fn since(self) -> Ns {
+        match self {
+            Brakes::Engaged { since } | Brakes::Released { since } => since,
+        }
+    }
+}
 
 /// Safety, amplifiers and converters.
 pub struct Output {
@@ -18,8 +45,7 @@ pub struct Output {
     converters: Converters,
     /// What the last job did after its decision.
     rest: Option<Rest>,
-    /// Since when the drives have been on and the brakes released, own clock.
-    released: Option<Ns>,
+    brakes: Brakes,
     finite: bool,
 }
 
@@ -46,7 +72,7 @@ impl Output {
             safety: Safety::new(&scenario.safety),
             converters: Converters { nm_per_v, bits: scenario.da_io.bits.into() },
             rest: None,
-            released: None,
+            brakes: Brakes::Engaged { since: 0 },
             finite: true,
         })
     }
@@ -81,9 +107,14 @@ impl Output {
         state
     }
 
-    /// Since when the brakes have been released, own clock; none: they are engaged.
-    pub fn released(&self) -> Option<Ns> {
-        self.released
+    /// What has been asked of the brakes.
+    pub fn brakes(&self) -> Brakes {
+        self.brakes
+    }
+
+    /// Whether the arm rests on its motors alone at `now`.
+    pub fn carries(&self, now: Ns) -> bool {
+        matches!(self.brakes, Brakes::Released { since } if now > since + BRAKES_LET_GO)
     }
 
     /// Tells the drives, with these torques; returns when the job will have computed.
@@ -97,7 +128,11 @@ impl Output {
         out: &mut Outputs,
     ) -> Ns {
         self.finite = torque.iter().all(|torque| torque.is_finite());
-        self.released = if mode == Mode::Free { None } else { self.released.or(Some(now)) };
+        self.brakes = match (mode, self.brakes) {
+            (Mode::Free, Brakes::Released { .. }) => Brakes::Engaged { since: now },
+            (Mode::Law | Mode::Hold | Mode::Brake, Brakes::Engaged { .. }) => Brakes::Released { since: now },
+            (_, unchanged) => unchanged,
+        };
         let rest = match self.rest {
             _ if mode == Mode::Free || !self.finite => Rest::Stop,
             None | Some(Rest::Stop) => Rest::Start,

@@ -17,10 +17,7 @@ use arm::{ArmModel, ArmState, JointVector};
 use board::Outputs;
 use messages::{BusWord, Detector, Event, EventKind, Severity, TransferRecord};
 use scenario::Scenario;
-use vme::{MILLISECOND, Ns};
-
-/// Time in which released brakes let go, and the arm settles on its motors.
-pub const BRAKES_LET_GO: Ns = 200 * MILLISECOND;
+use vme::Ns;
 
 /// The second processor card.
 pub struct SecondCard {
@@ -125,7 +122,7 @@ impl SecondCard {
         let findings = &mut self.findings;
         findings.begin();
         self.sensors.report(findings);
-        self.sensors.report_brakes(now, self.output.released(), findings);
+        self.sensors.report_brakes(now, self.output.brakes(), findings);
         let (joint, share) = self.inverse.disturbed();
         if self.limits.max_residual_share > 0.0 && share > self.limits.max_residual_share {
             findings.report(Detector::TrackingResidual, State::Off, joint as f64);
@@ -155,9 +152,8 @@ impl SecondCard {
             self.inverse.observe(&arm, &tool, &sensed.qd, &wanted.fe, dt);
             (self.torque, torque_limited) = self.inverse.torque(&arm, &tool, &wanted, mode);
         }
-        let released = self.output.released();
-        let acts = mode != Mode::Free && released.is_some_and(|since| now > since + BRAKES_LET_GO);
-        self.inverse.sent(&sensed.qd, acts.then_some(self.torque));
+        let torque = (mode != Mode::Free && self.output.carries(now)).then_some(self.torque);
+        self.inverse.sent(&sensed.qd, torque);
         let written = self.output.write((self.task, job), (t, now), mode, &self.torque, &self.program, out);
         self.ram.show(written, Word { state, torque_limited });
     }

@@ -6,6 +6,7 @@
 
 use crate::findings::Findings;
 use crate::force_noise::ForceNoise;
+use crate::output::Brakes;
 use crate::program::{CARDS, COUNTER, COUNTS, ERRORS, FORCES, READS, STATUS, is_wide};
 use crate::safety::State;
 use arm::{JointVector, Spatial};
@@ -217,14 +218,15 @@ impl Sensors {
         }
     }
 
-    /// What the brakes' contacts say of the job before, in which they were to be released since `released`, or engaged.
-    pub fn report_brakes(&self, now: Ns, released: Option<Ns>, findings: &mut Findings) {
+    /// What the brakes' contacts say against what has been asked of the brakes, given the time to do it.
+    pub fn report_brakes(&self, now: Ns, brakes: Brakes, findings: &mut Findings) {
         let engaged = (self.status & drive_status::BRAKE_ENGAGED) >> 16;
         for joint in (0..JOINTS).filter(|joint| engaged >> joint & 1 == 1) {
-            let slips = self.sensed.qd[joint].abs() > self.limits.max_braked_speed_rad_per_s;
-            let late = nanoseconds(self.limits.max_brake_time_ms * 1e-3);
-            let stuck = released.is_some_and(|released| now > released + late);
-            if slips || stuck {
+            let wrong = match brakes {
+                Brakes::Released { .. } => true,
+                Brakes::Engaged { .. } => self.sensed.qd[joint].abs() > self.limits.max_braked_speed_rad_per_s,
+            };
+            if wrong && now > brakes.since() + nanoseconds(self.limits.max_brake_time_ms * 1e-3) {
                 findings.report(Detector::BrakeMotion, State::Off, joint as f64);
             }
         }
@@ -284,7 +286,8 @@ impl Sensors {
     fn jumps(&self, joint: usize, turned: i64, period_s: f64) -> bool {
         let limit = self.limits.max_count_jump_rad;
         let expected = self.sensed.qd[joint] * period_s * f64::from(self.held[COUNTS + 2 * joint] + 1);
-        limit > 0.0 && (turned as f64 / self.counts_per_rad[joint] - expected).abs() > limit
+        // where a joint stands when the power comes on is not known so well
+        self.counts_at[joint] > 0 && limit > 0.0 && (turned as f64 / self.counts_per_rad[joint] - expected).abs() > limit
     }
 
     fn read_force(&mut self) {
@@ -538,22 +541,23 @@ mod tests {
     fn a_joint_that_moves_on_its_brake_or_stays_on_it_takes_the_torque_off() {
         let mut sensors = all(&scenario(&[]));
         let counts = sensors.counts;
-        let brakes = |sensors: &Sensors, now, released| {
+        let after_70_ms = |sensors: &Sensors, brakes| {
             let mut findings = Findings::new();
-            sensors.report_brakes(now, released, &mut findings);
+            sensors.report_brakes(70_000_000, brakes, &mut findings);
             findings.demanded().0
         };
         give(&mut sensors, 0, counts, 0);
         sensors.take(&word(0, STATUS, 1 << (16 + 2), 0));
         sensors.read(0, 5e-3);
-        assert_eq!(brakes(&sensors, 70_000_000, None), State::Run, "engaged and at rest");
-        assert_eq!(brakes(&sensors, 70_000_000, Some(20_000_000)), State::Run, "not yet");
-        assert_eq!(brakes(&sensors, 70_000_000, Some(5_000_000)), State::Off, "stuck");
+        assert_eq!(after_70_ms(&sensors, Brakes::Engaged { since: 0 }), State::Run, "at rest");
+        assert_eq!(after_70_ms(&sensors, Brakes::Released { since: 20_000_000 }), State::Run, "not yet");
+        assert_eq!(after_70_ms(&sensors, Brakes::Released { since: 5_000_000 }), State::Off, "stuck");
         let speed = 0.03 * sensors.counts_per_rad[2] / encoder::VELOCITY_LSB;
         give(&mut sensors, 1, counts, 0);
         sensors.take(&word(1, STATUS, 1 << (16 + 2), 0));
         sensors.take(&word(1, COUNTS + 5, speed as u32, 0));
         sensors.read(1, 5e-3);
-        assert_eq!(brakes(&sensors, 70_000_000, None), State::Off, "slips");
+        assert_eq!(after_70_ms(&sensors, Brakes::Engaged { since: 20_000_000 }), State::Run, "not yet");
+        assert_eq!(after_70_ms(&sensors, Brakes::Engaged { since: 5_000_000 }), State::Off, "slips");
     }
 }

@@ -54,7 +54,7 @@ impl Default for Safety {
             max_old_force_jobs: 20,
             max_same_force_jobs: 0,
             max_force_slew_n: 100.0,
-            max_force_noise_n: 5.0,
+            max_force_noise_n: 10.0,
             max_free_force_n: 0.0,
             max_count_jump_rad: 2e-3,
             max_residual_share: 0.3,

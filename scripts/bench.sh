@@ -9,6 +9,14 @@ cargo build --release --workspace --bins --examples --quiet
 release="${CARGO_TARGET_DIR:-target}/release"
 out=$(mktemp -d)
 hogs=()
+# Every part ends: what takes longer than this many seconds is cut off, and said so.
+LIMIT=120
+limited() {
+    local code=0
+    timeout "$LIMIT" "$@" || code=$?
+    [ "$code" -ne 124 ] || echo "(cut off after $LIMIT s: $(basename "$1"))" >&2
+    return "$code"
+}
 end() {
     ((${#hogs[@]})) && kill "${hogs[@]}" 2>/dev/null
     rm -rf "$out"
@@ -18,14 +26,17 @@ trap end EXIT
 # the arm's algorithms, a control step and a plant step beside Pinocchio (two builds) and MuJoCo, in one run
 outside() {
     local python
-    python=$(./scripts/python-env.sh outside)
+    python3 -c 'import venv, ensurepip' 2>/dev/null || need_packages python3 python3-venv
+    command -v g++ >/dev/null || need_packages g++
+    python=$(timeout 900 ./scripts/python-env.sh outside)
     {
-        cargo bench --quiet -p arm --bench algorithms | sed 's/^/vmerack /'
-        "$release/examples/control_step" | awk '/^round/ { if (!n || $3 < n) n = $3 } END { print "vmerack control_step", n }'
-        "$release/examples/plant_step" | sed 's/^/vmerack /'
-        "$python" scripts/reference/bench_outside.py
+        limited cargo bench --quiet -p arm --bench algorithms | sed 's/^/vmerack /' || true
+        limited "$release/examples/control_step" | awk '/^round/ { if (!n || $3 < n) n = $3 } END { print "vmerack control_step", n }' || true
+        limited "$release/examples/plant_step" | sed 's/^/vmerack /' || true
+        timeout 2400 "$python" scripts/reference/bench_outside.py || echo "outside tools: not to their end" >&2
     } | awk -f scripts/reference/side_by_side.awk
     echo "control_step: Pinocchio's has kinematics, the 7x7 solve and RNEA only, ours AHIC, ERC and wrenches too."
+    echo "aba: MuJoCo has none, its forward dynamics (CRB and a factorisation) stand there."
     echo "plant_step: MuJoCo's is rigid and touches nothing, ours has flexible joints, friction and contact."
     echo "tip+rnea, tip+fd: what a control step and a plant step ask of the arm's model."
 }
@@ -41,12 +52,13 @@ rack() {
     local name=$1 best=
     shift
     for _ in 1 2 3 4 5; do
-        "$release/vmerack" run table-5-3 --variant modified --set 'report.sweep=[]' --out "$out" --json "$@" >"$out/stdout.json" || true
+        limited "$release/vmerack" run table-5-3 --variant modified --set 'report.sweep=[]' --out "$out" --json "$@" >"$out/stdout.json" || true
         local wall
         wall=$(sed -n 's/^ *"wall_s": \([0-9.]*\),*$/\1/p' "$out/stdout.json" | head -n 1)
-        best=$(awk -v a="$wall" -v b="${best:-$wall}" 'BEGIN { print a < b ? a : b }')
+        [ -n "$wall" ] || continue
+        best=$(awk -v a="$wall" -v b="${best:-$wall}" 'BEGIN { print a + 0 < b + 0 ? a : b }')
     done
-    awk -v n="$name" -v w="$best" 'BEGIN { printf "%-44s %8.3f s %8.1f x real time\n", n, w, 13 / w }'
+    awk -v n="$name" -v w="${best:-nan}" 'BEGIN { printf "%-44s %8.3f s %8.1f x real time\n", n, w, 13 / w }'
 }
 racks() {
     rack "in one process, recording off$1" --in-process --no-record
@@ -70,11 +82,12 @@ windows() {
     local scenario=$1 variant=$2 seconds=$3 best= wall
     shift 3
     for _ in 1 2 3 4 5; do
-        "$release/vmerack" run "$scenario" --variant "$variant" --duration "$seconds" --set 'report.sweep=[]' --no-record --out "$out" --json "$@" >"$out/stdout.json" || true
+        limited "$release/vmerack" run "$scenario" --variant "$variant" --duration "$seconds" --set 'report.sweep=[]' --no-record --out "$out" --json "$@" >"$out/stdout.json" || true
         wall=$(sed -n 's/^ *"wall_s": \([0-9.]*\),*$/\1/p' "$out/stdout.json" | head -n 1)
-        best=$(awk -v a="$wall" -v b="${best:-$wall}" 'BEGIN { print a < b ? a : b }')
+        [ -n "$wall" ] || continue
+        best=$(awk -v a="$wall" -v b="${best:-$wall}" 'BEGIN { print a + 0 < b + 0 ? a : b }')
     done
-    echo "$best"
+    echo "${best:-nan}"
 }
 times() {
     awk -v n="$1" -v w="$2" -v s="$3" 'BEGIN { printf "%-56s %8.3f s %8.1f x real time\n", n, w, s / w }'
@@ -94,21 +107,21 @@ times "force-card interrupts at 8 kHz (limit 1)" "$(windows table-5-3 modified 3
     --set 'rack.tasks.control.release={ interrupt = "force-sample" }' \
     --set 'rack.interrupters.force-sample.ticks={ period_ns = 125000 }')" 3
 echo "arbiter alone (limit 5 M transfers/s), and the nominal window of the timing plane alone"
-cargo bench --quiet -p vme --bench bus
+limited cargo bench --quiet -p vme --bench bus || true
 
 echo
 echo "whole command, 0.005 s of simulated time, seconds of wall time (start-up, report and shut-down)"
 for _ in 1 2 3; do
     start=$(date +%s.%N)
-    "$release/vmerack" run table-5-3 --variant modified --set 'report.sweep=[]' --duration 0.005 --out "$out" --json >/dev/null || true
+    limited "$release/vmerack" run table-5-3 --variant modified --set 'report.sweep=[]' --duration 0.005 --out "$out" --json >/dev/null || true
     awk -v a="$start" -v b="$(date +%s.%N)" 'BEGIN { printf "%.3f\n", b - a }'
 done
 
 echo
 echo "sweep: runs a minute of a 2-s one-axis scenario (200 Hz control, 2 kHz plant), 500 runs on all cores"
 start=$(date +%s.%N)
-"$release/vmerack" sweep one-axis-delay --variant zeta-1 --set duration_s=2.0 --vary encoder_if.delay_ms=40..90:500 \
-    --measure envelope_growth --out "$out/sweep" >/dev/null 2>&1
+limited "$release/vmerack" sweep one-axis-delay --variant zeta-1 --set duration_s=2.0 --vary encoder_if.delay_ms=40..90:500 \
+    --measure envelope_growth --out "$out/sweep" >/dev/null || true
 awk -v a="$start" -v b="$(date +%s.%N)" 'BEGIN { printf "%.0f\n", 500 * 60 / (b - a) }'
 
 echo
@@ -124,31 +137,31 @@ wait "$rack" || true
 
 echo
 echo "one control step (FK, J, J̇q̇, AHIC, ERC, RR, inverse dynamics)"
-"$release/examples/control_step"
+limited "$release/examples/control_step" || true
 echo
 echo "one hop, 256 bytes, between two processes"
-"$release/examples/hop"
+limited "$release/examples/hop" || true
 echo
 echo "lock step, all processes, empty boards and their data over iceoryx2, best of three"
-windows() {
+empty_windows() {
     for bell in yield block spin; do
-        for _ in 1 2 3; do VMERACK_BELL=$bell "$release/examples/windows" 2; done | sort -k2 -n | tail -n 1
+        for _ in 1 2 3; do VMERACK_BELL=$bell limited "$release/examples/windows" 2 || true; done | sort -k2 -n | tail -n 1
     done
 }
-windows
+empty_windows
 for _ in 1 2; do
     (while :; do :; done) &
     hogs+=($!)
 done
 echo "the same beside two hogs"
-windows
+empty_windows
 kill "${hogs[@]}"
 hogs=()
 
 echo
 echo "integration of the plant"
-"$release/examples/integrators"
-"$release/examples/plant_step"
+limited "$release/examples/integrators" || true
+limited "$release/examples/plant_step" || true
 if [ "${1:-}" = --outside ]; then
     echo
     outside

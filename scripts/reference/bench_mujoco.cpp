@@ -44,6 +44,16 @@ int main(int argc, char **argv) {
         mj_comPos(m, d);
         mj_jacBody(m, d, jp, jr, m->nbody - 1);
     });
+    bench("jdot_qd", [&] {
+        static double dp[3 * 64], dr[3 * 64], tip[6];
+        const int body = m->nbody - 1;
+        mj_kinematics(m, d);
+        mj_comPos(m, d);
+        mj_comVel(m, d);
+        mj_jacDot(m, d, dp, dr, d->xpos + 3 * body, body);
+        mju_mulMatVec(tip, dp, d->qvel, 3, m->nv);
+        mju_mulMatVec(tip + 3, dr, d->qvel, 3, m->nv);
+    });
     bench("rnea", [&] {
         mj_kinematics(m, d);
         mj_comPos(m, d);
@@ -55,5 +65,7 @@ int main(int argc, char **argv) {
         mj_comPos(m, d);
         mj_crb(m, d);
     });
+    // it has no articulated-body algorithm: CRB and a factorisation give the same accelerations
+    bench("aba", [&] { mj_forward(m, d); });
     bench("plant_step", [&] { mj_step(m, d); });
 }

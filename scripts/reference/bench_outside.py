@@ -4,7 +4,8 @@
 Pinocchio: compiled from the wheel's headers in two builds, plain -O3 and -march=native; both are printed. MuJoCo: the
 wheel's library, called from C++. Without g++, the Python calls are timed instead and the tool's name says `python`
 (1-3 microseconds of each such figure are the call from Python). Needs scripts/reference/requirements.txt. The
-programs are compiled once (minutes), into the build folder, and again only when their source is newer.
+programs are compiled once (minutes), into the build folder, and again only when their source is newer. MuJoCo comes first:
+it compiles in seconds. Whatever takes longer than its limit is left out, and stderr says so.
 
     $(./scripts/python-env.sh outside) scripts/reference/bench_outside.py
 """
@@ -21,6 +22,8 @@ import pinocchio as pin
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
+# wall time that one program may take
+COMPILE_S, RUN_S = 900, 120
 URDF = ROOT / "shared/arm/src/robots/rediestro.urdf"
 sys.path.insert(0, str(HERE))
 from arm_reference import mujoco_model  # noqa: E402
@@ -42,30 +45,40 @@ def numbers(model):
 
 
 def compiled(work):
+    wheel = Path(mujoco.__file__).parent
+    library = next(wheel.glob("libmujoco.so*"))
+    model = work / "arm.xml"
+    mujoco.mj_saveLastXML(str(model), mujoco_model(URDF))
+    options = [f"-I{wheel}/include", library, f"-Wl,-rpath,{wheel}"]
+    measure("mujoco", HERE / "bench_mujoco.cpp", work / "mujoco-bench", options, [model])
+
     prefix = next(p for p in Path(pin.__file__).parents if p.name == "cmeel.prefix")
     arm = numbers(pin.buildModelFromUrdf(str(URDF)))
     headers = [f"-I{prefix}/include", f"-I{prefix}/include/eigen3"]
     # Pinocchio has more joint types, and steps with more arguments, than Boost allows for by default
     headers += ["-DBOOST_MPL_LIMIT_LIST_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS", "-DBOOST_FUSION_INVOKE_MAX_ARITY=10"]
     for name, options in (("pinocchio", []), ("pinocchio-native", ["-march=native"])):
-        binary = work / name
-        build(HERE / "bench_pinocchio.cpp", binary, [*options, *headers])
-        report(name, subprocess.run([binary], input=arm, text=True, capture_output=True, check=True).stdout)
+        measure(name, HERE / "bench_pinocchio.cpp", work / name, [*options, *headers], [], arm)
 
-    wheel = Path(mujoco.__file__).parent
-    library = next(wheel.glob("libmujoco.so*"))
-    model = work / "arm.xml"
-    mujoco_model(URDF)
-    mujoco.mj_saveLastXML(str(model), mujoco_model(URDF))
-    binary = work / "mujoco-bench"
-    build(HERE / "bench_mujoco.cpp", binary, [f"-I{wheel}/include", library, f"-Wl,-rpath,{wheel}"])
-    report("mujoco", subprocess.run([binary, model], text=True, capture_output=True, check=True).stdout)
+
+def measure(tool, source, binary, options, arguments, text=None):
+    """Compiles and runs one program and reports its lines."""
+    try:
+        build(source, binary, options)
+        ran = subprocess.run([binary, *arguments], input=text, text=True, capture_output=True, check=True, timeout=RUN_S)
+        report(tool, ran.stdout)
+    except subprocess.TimeoutExpired as late:
+        print(f"{tool} is left out: {late.cmd[0]} took more than {late.timeout:.0f} s", file=sys.stderr)
 
 
 def build(source, binary, options):
     if binary.exists() and binary.stat().st_mtime > source.stat().st_mtime:
         return
-    subprocess.run(["g++", "-std=c++17", "-O3", "-DNDEBUG", source, *options, "-o", binary], check=True)
+    # under another name first: a compiler that was stopped leaves nothing that looks finished
+    part = binary.with_suffix(".part")
+    command = ["g++", "-std=c++17", "-O3", "-DNDEBUG", source, *options, "-o", part]
+    subprocess.run(command, check=True, timeout=COMPILE_S)
+    part.rename(binary)
 
 
 def report(tool, text):

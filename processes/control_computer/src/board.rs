@@ -50,7 +50,8 @@ pub struct ControlComputer {
     /// No segment with a force axis has begun: the tool touches nothing; the force that the last job measured, N.
     free: bool,
     force_n: f64,
-    hold: bool,
+    /// The arm is to be held, and why.
+    hold: Option<Detector>,
     acknowledge: bool,
     segment: u32,
     target_limited: u32,
@@ -111,7 +112,7 @@ impl ControlComputer {
             epoch: 0,
             free: true,
             force_n: 0.0,
-            hold: false,
+            hold: None,
             acknowledge: false,
             segment: NO_SEGMENT,
             target_limited: 0,
@@ -148,6 +149,10 @@ impl ControlComputer {
     }
 
     fn judge(&mut self, command: &Command) -> Result<(), Refusal> {
+        if command.epoch <= self.epoch {
+            // whoever repeats an old command does not know how far the arm has come
+            self.hold = Some(Detector::CommandEpoch);
+        }
         if command.epoch != self.epoch + 1 {
             return Err(Refusal::Epoch);
         }
@@ -156,7 +161,7 @@ impl ControlComputer {
             kind if kind == CommandKind::Segment as u32 => {
                 let segment = commands::segment(command)?;
                 let trajectory = self.pipeline.trajectory();
-                if self.hold || self.state > State::Degraded {
+                if self.hold.is_some() || self.state > State::Degraded {
                     return Err(Refusal::State);
                 }
                 // before the first job nobody knows where the tool is
@@ -171,7 +176,7 @@ impl ControlComputer {
                 }
                 trajectory.push(segment);
             }
-            kind if kind == CommandKind::Hold as u32 => self.hold = true,
+            kind if kind == CommandKind::Hold as u32 => self.hold = Some(Detector::Operator),
             kind if kind == CommandKind::Acknowledge as u32 => self.acknowledge = true,
             _ => return Err(Refusal::Kind),
         }
@@ -220,7 +225,7 @@ impl ControlComputer {
                 (Job { torque: *card.torque(), ..done }, t + self.program.execution_ns(Rest::Run))
             }
         };
-        (self.hold, self.acknowledge) = (false, false);
+        (self.hold, self.acknowledge) = (None, false);
         self.free &= self.pipeline.trajectory().impedance().selection.iter().all(|s| *s == 1.0);
         self.force_n = done.contact.fe.fixed_rows::<3>(0).norm();
         self.tell(t, &done, out);
@@ -243,8 +248,8 @@ impl ControlComputer {
     /// What is wrong beside the sensors' registers.
     fn supervise(&mut self, job: u32, t: Ns, now: Ns) {
         let Self { limits, findings, .. } = self;
-        if self.hold {
-            findings.report(Detector::Operator, State::Hold, 0.0);
+        if let Some(cause) = self.hold {
+            findings.report(cause, State::Hold, self.epoch.into());
         }
         let (period, polled) = self.console;
         if let Some(polled) = polled
@@ -262,10 +267,7 @@ impl ControlComputer {
         }
         if let End::Drives(output) = &self.end {
             self.sensors.report_brakes(now, output.brakes(), findings);
-            let (joint, share) = self.pipeline.inverse().disturbed();
-            if limits.max_residual_share > 0.0 && share > limits.max_residual_share {
-                findings.report(Detector::TrackingResidual, State::Off, joint as f64);
-            }
+            self.pipeline.inverse().report(limits, findings);
         }
         if limits.max_free_force_n > 0.0 && self.free && self.force_n > limits.max_free_force_n {
             findings.report(Detector::ForceZero, State::Stop, self.force_n);
@@ -281,7 +283,8 @@ impl ControlComputer {
             }
             End::SecondCard { card, .. } => {
                 self.findings.tell(t, out);
-                card.ram().read().state
+                // what this card finds it need not wait for
+                card.ram().read().state.max(self.findings.demanded().0)
             }
         };
         if state != self.state && state == State::Hold {

@@ -5,11 +5,14 @@
 //! close another loop. Torques beyond a drive's limit are cut there and reported.
 
 use crate::disturbance::Disturbance;
+use crate::findings::Findings;
 use crate::frame::{TaskKinematics, transposed_times};
 use crate::handover::Wanted;
 use crate::pipeline::Mode;
+use crate::safety::State;
 use arm::drives::DriveData;
 use arm::{ArmState, DOF, JointVector, Spatial};
+use messages::Detector;
 use scenario::Scenario;
 
 /// Torques for what the law wants.
@@ -41,9 +44,16 @@ impl InverseDynamics {
         self.disturbance.sent(qd, torque);
     }
 
-    /// The joint with the greatest torque that nothing accounts for, and that torque as a share of its drive's limit.
-    pub fn disturbed(&self) -> (usize, f64) {
-        self.disturbance.greatest(&self.drives)
+    /// Reports the torques that nothing accounts for, where they are more than friction can be.
+    pub fn report(&self, limits: &scenario::Safety, findings: &mut Findings) {
+        let (joint, share) = self.disturbance.greatest(&self.drives);
+        if limits.max_residual_share > 0.0 && share > limits.max_residual_share {
+            findings.report(Detector::TrackingResidual, State::Off, joint as f64);
+        }
+        let force = self.disturbance.force_n();
+        if limits.max_force_residual_n > 0.0 && force > limits.max_force_residual_n {
+            findings.report(Detector::ForceResidual, State::Stop, force);
+        }
     }
 
     /// τ within the drives' limits, and the joints that were cut there, a bit each.

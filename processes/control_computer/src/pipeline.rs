@@ -65,6 +65,8 @@ pub struct Pipeline {
 struct OuterLoop {
     tool: ToolCompensation,
     law: Law,
+    /// F_e of the last job under the law: SS2 feeds it forward, for what is measured then is not to be trusted.
+    trusted: Spatial,
 }
 
 impl Pipeline {
@@ -84,7 +86,7 @@ impl Pipeline {
             &arm.gravity(),
             (tare > 0).then_some(tare),
         );
-        let outer = OuterLoop { tool, law: Law::new(scenario, &arm) };
+        let outer = OuterLoop { tool, law: Law::new(scenario, &arm), trusted: Spatial::zeros() };
         Ok(Pipeline { frame, outer, inverse: InverseDynamics::new(scenario)?, arm })
     }
 
@@ -128,7 +130,12 @@ impl Pipeline {
 impl OuterLoop {
     /// What is wanted of the joints, no torques yet.
     fn decide(&mut self, now: Ns, dt: f64, sensed: &Sensed, tool: &TaskKinematics, mode: Mode) -> Job {
-        let contact = (self.tool).contact(&sensed.wrench, &tool.pose, &tool.twist, now, dt);
+        let mut contact = (self.tool).contact(&sensed.wrench, &tool.pose, &tool.twist, now, dt);
+        match mode {
+            Mode::Law => self.trusted = contact.fe,
+            Mode::Hold => contact.fe = self.trusted,
+            Mode::Brake | Mode::Free => {}
+        }
         let mut law = match mode {
             Mode::Law => self.law.decide(now, sensed, tool, &contact.fe),
             Mode::Hold => self.law.decide(now, sensed, tool, &Spatial::zeros()),

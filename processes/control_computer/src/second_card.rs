@@ -123,10 +123,7 @@ impl SecondCard {
         findings.begin();
         self.sensors.report(findings);
         self.sensors.report_brakes(now, self.output.brakes(), findings);
-        let (joint, share) = self.inverse.disturbed();
-        if self.limits.max_residual_share > 0.0 && share > self.limits.max_residual_share {
-            findings.report(Detector::TrackingResidual, State::Off, joint as f64);
-        }
+        self.inverse.report(&self.limits, findings);
         if let Some(wanted) = &wanted {
             findings.demand(wanted.demand, wanted.cause);
         }

@@ -2,8 +2,8 @@
 //!
 //! At power-up the amplifiers are disabled and the brakes engaged. The logic does not trust the control computer: an
 //! amplifier trip, or an output that is not what was written, takes the torque off that axis and engages its brake (STO);
-//! an open emergency chain, an expired watchdog and a supply that goes do so on all axes. Each is latched until its cause is gone and [`ACKNOWLEDGE`] is written; then the registers
-//! have to be written anew.
+//! an open emergency chain, an expired watchdog and a supply that goes do so on all axes. Each is latched until its cause is
+//! gone and [`ACKNOWLEDGE`] is written; then the registers have to be written anew.
 
 use crate::converter::Converter;
 use crate::watchdog::Watchdog;
@@ -96,10 +96,19 @@ pub struct Cards {
     sto: u32,
     /// What is wrong with the converters and the supply.
     damage: Damage,
-    /// When the supply goes; none: it holds.
-    power_off: Option<Ns>,
+    supply: Supply,
     /// Channels whose read-back was wrong when last compared.
     astray: u32,
+}
+
+/// The supply of the rack.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Supply {
+    Holds,
+    /// ACFAIL*: it goes at this instant.
+    Fails(Ns),
+    /// Gone for good.
+    Gone,
 }
 
 /// What is wrong with the converters and the supply.
@@ -131,7 +140,7 @@ impl Cards {
             input: drive_status::BRAKE_ENGAGED,
             sto: 0,
             damage: Damage::default(),
-            power_off: None,
+            supply: Supply::Holds,
             astray: 0,
         })
     }
@@ -165,7 +174,9 @@ impl Cards {
         for n in 0..CHANNELS {
             self.convert(n, self.codes[n]);
         }
-        self.power_off = self.power_off.or(damage.power_fail.map(|holds| t + holds));
+        if let (Supply::Holds, Some(holds)) = (self.supply, damage.power_fail) {
+            self.supply = Supply::Fails(t + holds);
+        }
         self.read_back(t, events);
     }
 
@@ -232,6 +243,9 @@ impl Cards {
     }
 
     fn acknowledge(&mut self) {
+        if self.supply == Supply::Gone {
+            return;
+        }
         self.watchdog.acknowledge();
         self.sto = causes(self.input) | self.astray;
     }
@@ -254,7 +268,7 @@ impl Cards {
         if self.astray != 0 {
             input |= drive_status::DA_FAULT;
         }
-        if self.power_off.is_some() {
+        if self.supply != Supply::Holds {
             input |= drive_status::POWER_FAIL;
         }
         self.wires = wires;
@@ -289,12 +303,8 @@ impl Cards {
     /// When something happens next without anybody's doing.
     pub fn next_timer(&self) -> Ns {
         let brakes = self.brake_due.iter().copied().min().unwrap_or(Ns::MAX);
-        brakes.min(self.watchdog.deadline().unwrap_or(Ns::MAX)).min(self.supply_ends().unwrap_or(Ns::MAX))
-    }
-
-    /// When the supply goes, where it has not gone yet.
-    fn supply_ends(&self) -> Option<Ns> {
-        self.power_off.filter(|_| self.sto != ALL || self.released != 0)
+        let supply = if let Supply::Fails(at) = self.supply { at } else { Ns::MAX };
+        brakes.min(self.watchdog.deadline().unwrap_or(Ns::MAX)).min(supply)
     }
 
     /// Brakes, watchdog and supply whose time is `t`.
@@ -305,7 +315,8 @@ impl Cards {
                 self.released = self.released & !(1 << i) | self.brake & (1 << i);
             }
         }
-        if self.supply_ends() == Some(t) {
+        if self.supply == Supply::Fails(t) {
+            self.supply = Supply::Gone;
             self.stop(t, ALL);
             // brakes without power fall in at once
             (self.released, self.brake_due) = (0, [Ns::MAX; JOINTS]);

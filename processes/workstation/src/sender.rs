@@ -59,8 +59,9 @@ impl Sender {
     pub fn poll(&mut self, now: Ns, accepted: Option<u32>) -> Poll {
         let mut poll = Poll::default();
         if let Some(accepted) = accepted {
-            let done =
-                self.commands[..self.sent].partition_point(|command| command.epoch <= accepted);
+            let done = self.commands.partition_point(|command| command.epoch <= accepted);
+            // accepted from a program that ran before this one
+            self.sent = self.sent.max(done);
             if done > self.settled {
                 self.settle(done);
             } else if self.settled < self.sent {

@@ -60,9 +60,11 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
         within(event.t) && (event.cause != 0 || seen.iter().any(|kind| event.kind == *kind as u32))
     };
     let first = trace.events.iter().find(consequence);
-    let states = trace.events.iter().filter(|event| event.kind == EventKind::SafetyState as u32 && within(event.t));
-    let gravest = states.clone().map(|event| event.b as usize).max();
-    let stopping = states.clone().find(|event| event.b as usize >= HOLD);
+    let states = trace.events.iter().filter(|event| event.kind == EventKind::SafetyState as u32);
+    let at_begin = states.clone().take_while(|event| event.t < from).last();
+    let mut states = states.filter(|event| within(event.t));
+    let gravest = at_begin.into_iter().chain(states.clone()).map(|event| event.b as usize).max();
+    let stopping = states.find(|event| event.b as usize >= HOLD);
     let probes = trace.plant.iter().filter(|probe| within(probe.t));
     let before = probes.clone().next()?;
     let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -95,6 +97,14 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
         peak_torque_share,
         distance_m,
     })
+}
+
+/// What fires although no fault has been injected yet: time (s) and name of each detector's events.
+pub(crate) fn trips(trace: &Trace) -> impl Iterator<Item = (f64, String)> {
+    let injected = trace.events.iter().find(|event| event.kind == EventKind::FaultInjected as u32);
+    let from = injected.map_or(vme::Ns::MAX, |event| event.t);
+    let fired = move |event: &&Event| event.kind == EventKind::Detected as u32 && event.t < from;
+    trace.events.iter().filter(fired).filter_map(|event| Some((seconds(event.t), detector(event)?)))
 }
 
 /// What an event was detected by: the detector, or what such an event itself is.

@@ -152,6 +152,7 @@ impl VariantResult {
                     .push(format!("task {} lost {} releases: the job before still ran", task.name, task.lost_releases));
             }
         }
+        findings.extend(faults::trips(trace).map(|(at_s, name)| format!("{name} fired at {at_s:.3} s: nothing was injected")));
         let tripped = |event: &&messages::Event| event.kind == EventKind::OverrunTrip as u32;
         for event in trace.events.iter().filter(tripped) {
             let task = scenario.rack.tasks.get(event.b as usize);

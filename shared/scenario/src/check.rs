@@ -26,6 +26,7 @@ pub(crate) fn check(scenario: &Scenario) -> Result {
         ("max_free_force_n", safety.max_free_force_n, 1e6),
         ("max_count_jump_rad", safety.max_count_jump_rad, 10.0),
         ("max_residual_share", safety.max_residual_share, 100.0),
+        ("max_force_residual_n", safety.max_force_residual_n, 1e6),
         ("max_braked_speed_rad_per_s", safety.max_braked_speed_rad_per_s, 100.0),
         ("max_brake_time_ms", safety.max_brake_time_ms, 1e4),
         ("max_command_step_m", safety.max_command_step_m, 100.0),

@@ -54,7 +54,8 @@ macro_rules! fault_kinds {
 }
 
 fault_kinds! {
-    /// Force sensor: `amount` is added (N, Nm).
+    /// Force sensor: `amount` is added (N, Nm). In contact it cannot be seen below `safety.max_force_residual_n` less what
+    /// friction hides.
     Bias = "bias";
     /// Force sensor: an error that grows by `amount` a second (N/s, Nm/s).
     Drift = "drift";
@@ -73,21 +74,22 @@ fault_kinds! {
     /// Force sensor: the cable is open, samples read zero and the error word says that the sensor has changed. Joint: the
     /// encoder's lines are open, its count stands and its status says so.
     WireBreak = "wire-break";
-    /// Joint: the encoder loses `amount` counts, once.
+    /// Joint: the encoder loses `amount` counts, once. Fewer than `safety.max_count_jump_rad` show when the motor passes its
+    /// next index mark, and not before.
     LostCounts = "lost-counts";
     /// Joint: the encoder's A and B tracks change at once, `amount` times, each one an error of two counts.
     QuadratureError = "quadrature-error";
     /// Joint: the encoder's counter wraps at `amount` bits instead of its width.
     Wrap = "wrap";
-    /// Joint: the encoder's index pulses do not come.
+    /// Joint: the encoder's index pulses do not come. It shows once the motor has turned one and a quarter times.
     IndexLoss = "index-loss";
-    /// Joint: the D/A output stays where it is.
+    /// Joint: the D/A output stays where it is. It shows once the output should be elsewhere, by 2.5 steps of the converter.
     DaStuck = "da-stuck";
-    /// Joint: `amount` (V) is added to the D/A output.
+    /// Joint: `amount` (V) is added to the D/A output. Less than 2.5 steps of the converter cannot be seen.
     DaOffset = "da-offset";
     /// Joint: the amplifier trips.
     AmplifierTrip = "amplifier-trip";
-    /// Joint: the brake, engaged, holds `amount` times its torque (0: nothing).
+    /// Joint: the brake, engaged, holds `amount` times its torque (0: nothing). It shows when it slips.
     BrakeSlip = "brake-slip";
     /// Joint: the brake does not release, or falls in.
     BrakeStuck = "brake-stuck";
@@ -125,9 +127,9 @@ fault_kinds! {
     Gone = "gone";
     /// Workstation: its newest command is sent again.
     StaleCommand = "stale-command";
-    /// Workstation: a command with a target `amount` m away at once.
+    /// Workstation: a command with a target `amount` m away at once. One within the limits cannot be told from a meant one.
     WrongCommand = "wrong-command";
-    /// Power: ACFAIL*; the supply holds for 4 ms more.
+    /// Power: ACFAIL*; the supply holds for `amount` ms more, at least 4.
     PowerFail = "power-fail";
 }
 

@@ -30,6 +30,9 @@ pub struct Safety {
     /// Torque that nothing accounts for (model, measured motion and measured force), filtered over 20 ms, from which the
     /// torque goes off, as a share of each joint's torque limit; friction is part of it. 0 = any.
     pub max_residual_share: f64,
+    /// Force at the tool that would explain these torques best, from which the sensor is taken to show it too much (bias,
+    /// drift) and the arm is stopped (SS1; N). Friction is part of it: in this arm's contact tasks up to some 50 N. 0 = any.
+    pub max_force_residual_n: f64,
     /// Speed of a joint whose brake is engaged, from which the torque goes off (rad/s).
     pub max_braked_speed_rad_per_s: f64,
     /// Time after which a released brake must have let go before the torque goes off (ms).
@@ -58,6 +61,7 @@ impl Default for Safety {
             max_free_force_n: 0.0,
             max_count_jump_rad: 2e-3,
             max_residual_share: 0.3,
+            max_force_residual_n: 0.0,
             max_braked_speed_rad_per_s: 0.02,
             max_brake_time_ms: 60.0,
             max_missed_polls: 3,

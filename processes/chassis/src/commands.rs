@@ -5,6 +5,7 @@ pub mod bus;
 pub mod compare;
 pub mod design;
 pub mod doctor;
+pub mod faults;
 pub mod latency;
 pub mod log;
 pub mod margin;

@@ -91,7 +91,8 @@ fn section(heading: &str, note: &str, content: &str) -> String {
     format!("<section><h2>{heading}</h2>{note}{content}</section>")
 }
 
-fn pill(of: Verdict) -> String {
+/// The verdict beside a title.
+pub(crate) fn pill(of: Verdict) -> String {
     format!("<span class=\"verdict {}\">{}</span>", class(of), verdict(of))
 }
 

@@ -7,6 +7,7 @@
 
 mod accounting;
 mod bus_rows;
+mod campaign;
 mod chart;
 mod compare;
 mod envelope;
@@ -27,8 +28,9 @@ mod trace;
 mod verdict;
 
 pub use accounting::{Accounting, BusAccount, MasterAccount, PartAccount, Spread, TaskAccount, WaterfallAccount};
+pub use campaign::{CampaignReport, DrawRow, DrawVerdict, FalseTrip, KindSummary, NullRuns, Totals};
 pub use compare::{CompareError, ComparedFigure, Comparison, StoredRun};
-pub use faults::FaultRow;
+pub use faults::{FaultRow, rows as fault_rows};
 pub use ledger::{Ledger, PathLatency};
 pub use measures::RunMeasures;
 pub use result::{RunReport, SCHEMA_VERSION, Sweep, SweepPoint, VariantResult, WriteError};

@@ -17,6 +17,7 @@ pub const SCENARIOS: &[(&str, &str)] = &[
     ("one-axis-force-delay", include_str!("../../scenarios/one-axis-force-delay.toml")),
     ("sampled-wall", include_str!("../../scenarios/sampled-wall.toml")),
     ("failures", include_str!("../../scenarios/failures.toml")),
+    ("campaign", include_str!("../../scenarios/campaign.toml")),
     ("bus-stress", include_str!("../../scenarios/bus-stress.toml")),
     ("processor-time", include_str!("../../scenarios/processor-time.toml")),
 ];

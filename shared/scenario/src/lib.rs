@@ -16,6 +16,7 @@ pub mod model;
 mod overrides;
 mod posture;
 mod schedule;
+mod source;
 
 pub use check::warnings;
 pub use faults::{Occurrence, Site};
@@ -25,6 +26,7 @@ pub use model::*;
 pub use integrable::Stiffness;
 pub use hardware::{nanoseconds, rpy_deg};
 pub use schedule::{Entry, Progress, Schedule};
+pub use source::Source;
 pub use posture::{PostureError, inverse_kinematics};
 
 /// Cards that the boards talk to by name; every rack has them.

@@ -2,23 +2,17 @@
 
 use crate::error::{Problem, ScenarioError};
 use crate::model::{Scenario, Variant};
+use crate::source::{Source, read_as};
 use crate::{builtin, check, overrides};
-use miette::{NamedSource, SourceSpan};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
-use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
-
-/// A longer file is no scenario.
-const MAX_BYTES: u64 = 1 << 20;
 
 /// A scenario file that has been read, with the overrides of the command line applied.
 #[derive(Clone, Debug)]
 pub struct Document {
     /// Name without folder and extension, for titles and folders.
     pub name: String,
-    file: String,
-    text: String,
+    source: Source,
     folder: PathBuf,
     tree: Table,
     /// What the command line has set: holds in every variant, whatever it sets itself.
@@ -45,17 +39,13 @@ pub fn load(name_or_path: &str, overrides: &[String]) -> Result<Document, Scenar
 
 impl Document {
     fn read(name_or_path: &str, settings: &[String]) -> Result<Document, ScenarioError> {
-        let (file, text, folder) = match builtin::text(name_or_path) {
-            Some(text) => (name_or_path.to_owned(), text.to_owned(), PathBuf::new()),
-            None => read_file(name_or_path)?,
+        let (source, folder) = match builtin::text(name_or_path) {
+            Some(text) => (Source::new(name_or_path, text), PathBuf::new()),
+            None => (Source::read(name_or_path)?, folder_of(name_or_path)),
         };
-        let name =
-            Path::new(&file).file_stem().map_or_else(|| "scenario".into(), |stem| stem.to_string_lossy().into_owned());
-        let mut document = Document { name, file, text, folder, tree: Table::new(), set: Vec::new() };
-        document.tree = document
-            .text
-            .parse::<Table>()
-            .map_err(|error| document.text_error("(file)", error.message(), error.span().unwrap_or(0..0)))?;
+        let stem = Path::new(name_or_path).file_stem();
+        let name = stem.map_or_else(|| "scenario".into(), |stem| stem.to_string_lossy().into_owned());
+        let mut document = Document { name, tree: source.tree()?, source, folder, set: Vec::new() };
         complete_rack(&mut document.tree);
         for setting in settings {
             let origin = format!("--set {setting}");
@@ -107,12 +97,7 @@ impl Document {
 
     fn resolve(&self, tree: &Table, variant: Option<&str>) -> Result<Scenario, ScenarioError> {
         let problem = |problem: Problem| self.locate(problem, variant);
-        finite(&mut String::new(), &Value::Table(tree.clone())).map_err(problem)?;
-        let mut scenario: Scenario = serde_path_to_error::deserialize(tree.clone()).map_err(|error| {
-            let path = error.path().to_string().replace('[', ".").replace(']', "");
-            let message = error.into_inner();
-            problem(Problem::new(path.trim_start_matches('.'), message.message()))
-        })?;
+        let mut scenario: Scenario = read_as(tree).map_err(problem)?;
         for file in [&mut scenario.arm.urdf, &mut scenario.arm.drives].into_iter().flatten() {
             *file = self.folder.join(&*file).to_string_lossy().into_owned();
         }
@@ -128,27 +113,14 @@ impl Document {
         if let Some(set) = self.set.iter().rev().find(concerned) {
             return from_override(&set.origin, problem);
         }
-        let span = DeTable::parse(&self.text).ok().map(|root| span_of(root.get_ref(), &problem.key));
-        match (span, variant) {
-            (Some(Found::Whole(span)), _) => self.text_error(&problem.key, &problem.message, span),
-            (_, Some(variant)) => from_override(&format!("{}: variant {variant}", self.file), problem),
-            (Some(Found::Parent(span)), None) => self.text_error(&problem.key, &problem.message, span),
-            (None, None) => self.text_error(&problem.key, &problem.message, 0..0),
+        match variant {
+            Some(variant) if !self.source.states(&problem.key) => {
+                from_override(&format!("{}: variant {variant}", self.source.file()), problem)
+            }
+            _ => self.source.error(&problem),
         }
     }
 
-    fn text_error(&self, key: &str, message: &str, span: Range<usize>) -> ScenarioError {
-        let start = span.start.min(self.text.len());
-        let line = self.text.as_bytes()[..start].iter().filter(|byte| **byte == b'\n').count() + 1;
-        ScenarioError::Text {
-            file: self.file.clone(),
-            line,
-            key: key.to_owned(),
-            message: message.trim_end().to_owned(),
-            text: NamedSource::new(&self.file, self.text.clone()),
-            span: SourceSpan::from(start..span.end.clamp(start, self.text.len())),
-        }
-    }
 }
 
 /// A receiver of more than 16 bits, for comparison with theory, has words of 32 in the same window.
@@ -201,88 +173,17 @@ fn complete_rack(tree: &mut Table) {
     }
 }
 
-fn read_file(path: &str) -> Result<(String, String, PathBuf), ScenarioError> {
-    let unreadable = |reason: String| ScenarioError::Read { name: path.to_owned(), reason };
-    let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
-    if size > MAX_BYTES {
-        return Err(unreadable(format!("it has {size} bytes; a scenario is a text file of at most {MAX_BYTES} bytes")));
-    }
-    let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
-    let text = String::from_utf8(bytes)
-        .map_err(|error| unreadable(format!("byte {} is not UTF-8 text", error.utf8_error().valid_up_to())))?;
-    let folder = Path::new(path).parent().map(Path::to_path_buf).unwrap_or_default();
-    let folder = std::path::absolute(&folder).unwrap_or(folder);
-    Ok((path.to_owned(), text, folder))
-}
-
 /// Whether `key` is `table` or lies in it.
 fn is_within(key: &str, table: &str) -> bool {
     key.strip_prefix(table).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
+/// Folder of a file, absolute.
+fn folder_of(path: &str) -> PathBuf {
+    let folder = Path::new(path).parent().map(Path::to_path_buf).unwrap_or_default();
+    std::path::absolute(&folder).unwrap_or(folder)
+}
+
 fn from_override(origin: &str, problem: Problem) -> ScenarioError {
     ScenarioError::Override { origin: origin.to_owned(), key: problem.key, message: problem.message }
-}
-
-/// TOML has `nan` and `inf`; no key of a scenario takes them.
-fn finite(path: &mut String, value: &Value) -> Result<(), Problem> {
-    let length = path.len();
-    let mut visit = |part: &str, value: &Value| {
-        if length > 0 {
-            path.push('.');
-        }
-        path.push_str(part);
-        finite(path, value)?;
-        path.truncate(length);
-        Ok(())
-    };
-    match value {
-        Value::Float(number) if !number.is_finite() => {
-            Err(Problem::new(path.clone(), format!("is {number}, expected a finite number")))
-        }
-        Value::Table(table) => table.iter().try_for_each(|(key, value)| visit(key, value)),
-        Value::Array(array) => array.iter().enumerate().try_for_each(|(i, value)| visit(&i.to_string(), value)),
-        _ => Ok(()),
-    }
-}
-
-enum Found {
-    /// The key itself stands in the text.
-    Whole(Range<usize>),
-    /// Only a table or array above it.
-    Parent(Range<usize>),
-}
-
-fn span_of(root: &DeTable<'_>, key: &str) -> Found {
-    let mut table = Some(root);
-    let mut array = None;
-    let mut span = 0..0;
-    for part in key.split('.') {
-        let next: Option<&toml::Spanned<DeValue<'_>>> = if let Some(table) = table {
-            match table.get_key_value(part) {
-                Some((name, value)) => {
-                    // `[[segment]]` spans its header only through its key
-                    span = if value.get_ref().is_table() || value.get_ref().is_array() {
-                        name.span()
-                    } else {
-                        value.span()
-                    };
-                    Some(value)
-                }
-                None => None,
-            }
-        } else if let Some(array) = array {
-            let array: &toml::de::DeArray<'_> = array;
-            part.parse().ok().and_then(|i: usize| array.get(i)).inspect(|value| span = value.span())
-        } else {
-            None
-        };
-        match next.map(|value| value.get_ref()) {
-            Some(DeValue::Table(inner)) => (table, array) = (Some(inner), None),
-            Some(DeValue::Array(inner)) => (table, array) = (None, Some(inner)),
-            Some(_) => (table, array) = (None, None),
-            None => return Found::Parent(span),
-        }
-    }
-    Found::Whole(span)
 }

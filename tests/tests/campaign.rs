@@ -49,7 +49,8 @@ fn the_same_campaign_and_seed_give_the_same_bytes_on_one_core_and_on_two() {
         assert!(read("one") == read("two"), "{file} differs");
     }
     let json: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(bench.path("one").join("campaign.json")).expect("written")).expect("JSON");
+        serde_json::from_slice(&std::fs::read(bench.path("one").join("campaign.json")).expect("written"))
+            .expect("JSON");
     let rows = json["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 4);
     for row in rows {
@@ -65,7 +66,8 @@ fn a_bound_that_does_not_hold_and_a_reaction_that_was_not_expected_end_in_exit_c
     let late = bench.run(&["faults", "--campaign", "late.toml", "--kinds", "stuck", "--out", "late"]).expect_code(4);
     assert!(late.stdout.contains("2 detected late"), "{}", late.stdout);
     bench.write("mild.toml", SMALL.replace("[\"stop\", \"off\"]", "[\"run\", \"run\"]"));
-    let mild = bench.run(&["faults", "--campaign", "mild.toml", "--kinds", "saturation", "--out", "mild"]).expect_code(4);
+    let mild =
+        bench.run(&["faults", "--campaign", "mild.toml", "--kinds", "saturation", "--out", "mild"]).expect_code(4);
     assert!(mild.stdout.contains("2 wrong reactions"), "{}", mild.stdout);
 }
 
@@ -85,7 +87,8 @@ fn bad_campaigns_and_kinds_are_refused_with_their_key() {
     let refused = |arguments: &[&str]| bench.run(&[&["faults", "--out", "out"], arguments].concat()).expect_code(2);
     refused(&["--campaign", "bad.toml"]).expect_message("bad.toml:5: watch_s: is -1");
     refused(&["--kinds", "stick"]).expect_message("--kinds: stick: there is no such kind");
-    refused(&["failures", "--set", "fault=[{target='bus', kind='stuck-bus', start_s=1.0}]"]).expect_message("without faults");
+    refused(&["failures", "--set", "fault=[{target='bus', kind='stuck-bus', start_s=1.0}]"])
+        .expect_message("without faults");
 }
 
 #[test]

@@ -28,7 +28,9 @@ impl Source {
         let unreadable = |reason: String| ScenarioError::Read { name: path.to_owned(), reason };
         let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
         if size > MAX_BYTES {
-            return Err(unreadable(format!("it has {size} bytes; a scenario is a text file of at most {MAX_BYTES} bytes")));
+            return Err(unreadable(format!(
+                "it has {size} bytes; a scenario is a text file of at most {MAX_BYTES} bytes"
+            )));
         }
         let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
         let text = String::from_utf8(bytes)

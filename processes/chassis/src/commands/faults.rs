@@ -20,11 +20,12 @@ use draw::Draw;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use plan::Plan;
-use report::{CampaignReport, DrawRow, SCHEMA_VERSION, Trace, Verdict};
+use report::{CampaignReport, DrawRow, SCHEMA_VERSION, Verdict};
 use scenario::{Problem, Scenario, ScenarioError};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
+use watch::Seen;
 
 /// Put faults of every kind into a task, and judge how each is detected and survived.
 #[derive(Debug, Args)]
@@ -63,7 +64,8 @@ pub fn run(args: FaultsArgs) -> miette::Result<u8> {
     let document = scenario::load(&args.scenario, &args.set)?;
     let base = document.scenario()?;
     if !base.faults.is_empty() {
-        let problem = Problem::new("fault", "is stated; expected a scenario without faults: the campaign draws its own");
+        let problem =
+            Problem::new("fault", "is stated; expected a scenario without faults: the campaign draws its own");
         return Err(refused(&args.scenario, problem).into());
     }
     let mut plan = Plan::load(args.campaign.as_deref(), &document)?;
@@ -83,8 +85,9 @@ pub fn run(args: FaultsArgs) -> miette::Result<u8> {
     let made = make_folder(&args.out)?;
     end_on_signals()?;
     let draws = draw::draws(&plan, &base, seed);
-    let outcome = carry_out(&plan, &base, &draws)
-        .and_then(|(rows, twins)| Ok((rows, null::runs(&plan, &plan.null_document(&document)?.scenario()?, seed, &twins)?)));
+    let outcome = carry_out(&plan, &base, &draws).and_then(|(rows, twins)| {
+        Ok((rows, null::runs(&plan, &plan.null_document(&document)?.scenario()?, seed, &twins)?))
+    });
     if INTERRUPTED.load(Ordering::Relaxed) {
         if made {
             // somebody else may have put something there
@@ -130,7 +133,7 @@ fn make_folder(folder: &Path) -> miette::Result<bool> {
 }
 
 /// Runs every fault beside its twin; the rows in the order of the draws, and the twins by their seeds.
-fn carry_out(plan: &Plan, base: &Scenario, draws: &[Draw]) -> miette::Result<(Vec<DrawRow>, BTreeMap<u64, Trace>)> {
+fn carry_out(plan: &Plan, base: &Scenario, draws: &[Draw]) -> miette::Result<(Vec<DrawRow>, BTreeMap<u64, Seen>)> {
     let failed = |what: &str, reason: String| miette!("{what}: {reason}");
     // a fault that presupposes another one has a twin of its own
     let shared = |draw: &&Draw| draw.faults.len() == 1;
@@ -146,14 +149,17 @@ fn carry_out(plan: &Plan, base: &Scenario, draws: &[Draw]) -> miette::Result<(Ve
         bar.inc(1);
         trace.map(|trace| (*seed, trace)).map_err(|reason| failed(&format!("run without a fault, seed {seed}"), reason))
     });
-    let twins: BTreeMap<u64, Trace> = traces.into_iter().collect::<miette::Result<_>>()?;
+    let twins: BTreeMap<u64, Seen> = traces.into_iter().collect::<miette::Result<_>>()?;
     let rows = parallel(draws, |draw| -> miette::Result<Option<DrawRow>> {
         if INTERRUPTED.load(Ordering::Relaxed) {
             return Ok(None);
         }
         let fault = draw.fault();
         let failed = |reason| {
-            failed(&format!("{} of {} at {} s, seed {}", fault.kind.name(), fault.target, fault.start_s, draw.seed), reason)
+            failed(
+                &format!("{} of {} at {} s, seed {}", fault.kind.name(), fault.target, fault.start_s, draw.seed),
+                reason,
+            )
         };
         let scenario = draw.scenario(base);
         let own = match shared(&draw) {

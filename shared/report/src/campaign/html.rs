@@ -60,7 +60,12 @@ fn cards(report: &CampaignReport) -> String {
     let in_bound: usize = report.kinds.iter().map(|kind| kind.in_bound).sum();
     let cards = [
         ("faults", totals.draws.to_string(), format!("{} of them with an effect", totals.effective), false),
-        ("detected in time", format!("{:.1} %", share(in_bound)), "of those with an effect".into(), in_bound < totals.effective),
+        (
+            "detected in time",
+            format!("{:.1} %", share(in_bound)),
+            "of those with an effect".into(),
+            in_bound < totals.effective,
+        ),
         ("undetected", totals.undetected.to_string(), format!("{} detected late", totals.late), totals.undetected > 0),
         (
             "wrong reaction",
@@ -71,14 +76,19 @@ fn cards(report: &CampaignReport) -> String {
         (
             "false trips",
             totals.false_trips.to_string(),
-            format!("in {:.0} s without a fault, {:.0} s of them in contact", report.null.simulated_s, report.null.contact_s),
+            format!(
+                "in {:.0} s without a fault, {:.0} s of them in contact",
+                report.null.simulated_s, report.null.contact_s
+            ),
             totals.false_trips > 0,
         ),
         ("kinds not shown", totals.not_shown.to_string(), format!("of {}", report.kinds.len()), totals.not_shown > 0),
     ];
     let card = |(what, figure, note, bad): &(&str, String, String, bool)| {
         let class = if *bad { "big short" } else { "big" };
-        format!("<article class=card><h3>{what}</h3><p class=\"{class}\">{figure}</p><p class=note>{note}</p></article>")
+        format!(
+            "<article class=card><h3>{what}</h3><p class=\"{class}\">{figure}</p><p class=note>{note}</p></article>"
+        )
     };
     cards.iter().map(card).collect()
 }

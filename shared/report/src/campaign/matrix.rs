@@ -78,7 +78,8 @@ fn field(faults: &[&DrawRow]) -> (&'static str, String) {
 fn hint(kind: &str, phase: &str, faults: &[&DrawRow]) -> String {
     let mut seen: Vec<(String, usize)> = Vec::new();
     for row in faults {
-        let what = format!("{}, {}: {}", row.detected_by.as_deref().unwrap_or("nothing"), row.reaction, row.verdict.name());
+        let what =
+            format!("{}, {}: {}", row.detected_by.as_deref().unwrap_or("nothing"), row.reaction, row.verdict.name());
         match seen.iter_mut().find(|(known, _)| *known == what) {
             Some((_, count)) => *count += 1,
             None => seen.push((what, 1)),
@@ -97,7 +98,8 @@ mod tests {
     fn a_field_takes_the_colour_of_its_worst_fault_and_shows_the_greatest_time() {
         let mut slow = row("contact", DrawVerdict::Late);
         slow.detected_after_ms = Some(75.4);
-        let svg = draw(&report(vec![row("contact", DrawVerdict::Passed), slow, row("free motion", DrawVerdict::NoEffect)]));
+        let svg =
+            draw(&report(vec![row("contact", DrawVerdict::Passed), slow, row("free motion", DrawVerdict::NoEffect)]));
         assert!(svg.contains("class=late") && svg.contains("≤ 75 ms") && svg.contains("2 of 2"));
         assert!(svg.contains("class=none") && svg.contains(">no effect<"));
     }

@@ -23,7 +23,8 @@ pub(super) const KIND_HEADINGS: [&str; 13] = [
 
 /// Cells of the table of kinds.
 pub(super) fn kind_cells(kind: &KindSummary) -> Vec<String> {
-    let mut cells = vec![kind.kind.clone(), kind.draws.to_string(), kind.effective.to_string(), kind.in_bound.to_string()];
+    let mut cells =
+        vec![kind.kind.clone(), kind.draws.to_string(), kind.effective.to_string(), kind.in_bound.to_string()];
     cells.extend([ms(kind.median_ms), ms(kind.greatest_ms), ms(Some(kind.bound_ms)), ms(kind.safe_ms)]);
     cells.extend([kind.undetected, kind.late, kind.wrong_reaction, kind.too_much_force].map(|n| n.to_string()));
     cells.push(if kind.shown || kind.verdict == Verdict::Failed && kind.undetected > 0 {

@@ -3,6 +3,7 @@
 //! Every fault has a random stream of its own, told by kind, phase and number, so that neither the order of the runs nor
 //! the other faults of the campaign move it.
 
+use super::judge::control_period_ms;
 use super::plan::{Kind, Plan};
 use board::Ns;
 use rand_chacha::ChaCha8Rng;
@@ -96,7 +97,12 @@ fn draw(plan: &Plan, base: &Scenario, seed: u64, (number, phase, repeat): (usize
     let known = FaultKind::ALL.iter().position(|known| *known == kind.kind).unwrap_or(0);
     let mut rng = stream(seed, (known as u64) << 40 | (phase as u64) << 20 | repeat as u64);
     let span = &plan.phases[phase];
-    let start_s = span.from_s + (span.until_s - span.from_s) * uniform(&mut rng);
+    let mut start_s = span.from_s + (span.until_s - span.from_s) * uniform(&mut rng);
+    if let Some([least, most]) = kind.in_period_ms {
+        let period_s = 1e-3 * control_period_ms(base);
+        let released = (span.from_s / period_s).ceil() + ((start_s - span.from_s) / period_s).floor();
+        start_s = released * period_s + 1e-3 * (least + (most - least) * uniform(&mut rng));
+    }
     let target = kind.targets[(uniform(&mut rng) * kind.targets.len() as f64) as usize].clone();
     let size = kind.amount[0] + (kind.amount[1] - kind.amount[0]) * uniform(&mut rng);
     let negative = uniform(&mut rng) < 0.5 && kind.either_sign;
@@ -155,7 +161,9 @@ mod tests {
         for draw in draws(&plan, &document.scenario().expect("built-in scenario"), 1) {
             let kind = &plan.kinds[draw.kind];
             let phase = &plan.phases[draw.phase];
-            assert!((nanoseconds(phase.from_s)..=nanoseconds(phase.until_s)).contains(&draw.at), "{draw:?}");
+            // a place in the control period may lie a little behind the phase's end
+            let end = nanoseconds(phase.until_s) + kind.in_period_ms.map_or(0, |_| 5_000_000);
+            assert!((nanoseconds(phase.from_s)..=end).contains(&draw.at), "{draw:?}");
             assert!((kind.amount[0]..=kind.amount[1]).contains(&draw.fault().amount.abs()), "{draw:?}");
             assert!(kind.targets.contains(&draw.fault().target));
         }

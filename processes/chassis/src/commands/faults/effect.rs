@@ -4,9 +4,9 @@
 //! the boards say about the fault itself (events, safety state) does not count.
 
 use super::plan::Effect;
+use super::watch::Seen;
 use board::Ns;
 use messages::{ControlProbe, JOINTS, PlantProbe};
-use report::Trace;
 
 /// Greatest differences between two runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,14 +15,20 @@ pub struct Difference {
     torque_nm: f64,
     angle_rad: f64,
     time_ms: f64,
+    transfers: f64,
 }
 
 impl Difference {
     /// Between a run and its twin, from `from` to the end of the run.
-    pub fn of(run: &Trace, twin: &Trace, from: Ns) -> Difference {
+    pub fn of(run: &Seen, twin: &Seen, from: Ns) -> Difference {
+        let transfers =
+            |seen: &Seen, end: Ns| seen.transfers.iter().filter(|t| (from..=end).contains(*t)).count() as f64;
+        let (run_of, twin_of) = (run, twin);
+        let (run, twin) = (&run.trace, &twin.trace);
         let end = run.plant.last().map_or(0, |probe| probe.t);
-        let mut difference = Difference::default();
-        let after = |trace: &Trace| trace.control.partition_point(|probe| probe.t < from);
+        let more = transfers(run_of, end) - transfers(twin_of, end);
+        let mut difference = Difference { transfers: more.abs(), ..Difference::default() };
+        let after = |trace: &report::Trace| trace.control.partition_point(|probe| probe.t < from);
         let mut jobs = run.control[after(run)..].iter().peekable();
         for theirs in &twin.control[after(twin)..] {
             if theirs.t > end {
@@ -45,6 +51,7 @@ impl Difference {
             || self.torque_nm > effect.torque_nm
             || self.angle_rad > effect.angle_rad
             || self.time_ms > effect.time_ms
+            || effect.transfers.is_some_and(|most| self.transfers > most)
     }
 
     fn job(&mut self, ours: &ControlProbe, theirs: &ControlProbe) {
@@ -89,14 +96,15 @@ mod tests {
 
     const PERIOD: Ns = 5_000_000;
 
-    fn trace(jobs: u32) -> Trace {
-        let mut trace = Trace::default();
+    fn trace(jobs: u32) -> Seen {
+        let mut seen = Seen::default();
+        let trace = &mut seen.trace;
         for job in 0..jobs {
             let t = Ns::from(job) * PERIOD;
             trace.control.push(ControlProbe { t, job, ..ControlProbe::zeroed() });
             trace.plant.push(PlantProbe { t, ..PlantProbe::zeroed() });
         }
-        trace
+        seen
     }
 
     #[test]
@@ -108,7 +116,7 @@ mod tests {
     #[test]
     fn what_was_before_the_fault_does_not_count() {
         let mut run = trace(10);
-        run.control[3].fe[2] = 7.0;
+        run.trace.control[3].fe[2] = 7.0;
         assert_eq!(Difference::of(&run, &trace(10), 4 * PERIOD), Difference::default());
         let difference = Difference::of(&run, &trace(10), 3 * PERIOD);
         assert!(difference.exceeds(&Effect { force_n: 6.9, ..Effect::default() }));
@@ -116,12 +124,22 @@ mod tests {
     }
 
     #[test]
+    fn one_transfer_more_is_a_difference_where_transfers_count() {
+        let mut run = trace(10);
+        run.transfers = vec![1, PERIOD, 2 * PERIOD];
+        let difference = |from| Difference::of(&run, &trace(10), from);
+        let counts = Effect { transfers: Some(1.0), ..Effect::default() };
+        assert!(difference(PERIOD).exceeds(&counts) && !difference(2 * PERIOD).exceeds(&counts));
+        assert!(!difference(0).exceeds(&Effect::default()));
+    }
+
+    #[test]
     fn a_job_that_is_missing_or_late_is_a_difference_in_time() {
         let mut run = trace(10);
-        run.control[6].t += 600_000;
+        run.trace.control[6].t += 600_000;
         assert!(Difference::of(&run, &trace(10), 0).exceeds(&Effect::default()));
         let mut run = trace(10);
-        run.control.remove(6);
+        run.trace.control.remove(6);
         let greatest = Effect { time_ms: 1e9, ..Effect::default() };
         assert!(Difference::of(&run, &trace(10), 0).exceeds(&greatest));
     }

@@ -3,14 +3,15 @@
 use super::draw::Draw;
 use super::effect::Difference;
 use super::plan::{Kind, Plan, State};
-use super::watch::is_braked;
+use super::watch::{Seen, is_braked};
 use board::Ns;
 use messages::{Event, EventKind};
 use report::{DrawRow, DrawVerdict, KindSummary, NullRuns, Totals, Trace, Verdict};
 use scenario::Scenario;
 
 /// The row of a drawn fault: its run beside its twin.
-pub fn row(plan: &Plan, draw: &Draw, scenario: &Scenario, run: &Trace, twin: &Trace) -> DrawRow {
+pub fn row(plan: &Plan, draw: &Draw, scenario: &Scenario, seen: &Seen, twin: &Seen) -> DrawRow {
+    let run = &seen.trace;
     let (kind, fault) = (&plan.kinds[draw.kind], draw.fault());
     let period_ms = control_period_ms(scenario);
     let [mildest, gravest] = kind.reaction;
@@ -29,7 +30,11 @@ pub fn row(plan: &Plan, draw: &Draw, scenario: &Scenario, run: &Trace, twin: &Tr
         bound_ms: kind.detect.of(fault.amount, period_ms),
         safe_after_ms: None,
         reaction: State::Run.name().into(),
-        expected: if mildest == gravest { mildest.name().into() } else { format!("{} to {}", mildest.name(), gravest.name()) },
+        expected: if mildest == gravest {
+            mildest.name().into()
+        } else {
+            format!("{} to {}", mildest.name(), gravest.name())
+        },
         force_before_n: 0.0,
         peak_force_n: 0.0,
         force_growth_n: None,
@@ -41,7 +46,7 @@ pub fn row(plan: &Plan, draw: &Draw, scenario: &Scenario, run: &Trace, twin: &Tr
     // some faults begin with the next thing that they can befall
     let begun = nanoseconds_of(measured.injected_s);
     row.injected_s = measured.injected_s;
-    row.effect = Difference::of(run, twin, from).exceeds(&kind.effect.unwrap_or(plan.effect));
+    row.effect = Difference::of(seen, twin, from).exceeds(&kind.effect.unwrap_or(plan.effect));
     row.detected_by = measured.detected_by;
     row.detected_after_ms = measured.detected_after_s.map(|after| 1e3 * after);
     row.force_before_n = measured.force_before_n;
@@ -114,7 +119,8 @@ fn verdict(row: &DrawRow, reaction: State, kind: &Kind, growth_n: f64) -> DrawVe
 pub fn kind_summary(plan: &Plan, kind: &Kind, rows: &[DrawRow], strict: bool) -> KindSummary {
     let rows: Vec<&DrawRow> = rows.iter().filter(|row| row.kind == kind.kind.name()).collect();
     let effective: Vec<&&DrawRow> = rows.iter().filter(|row| row.effect).collect();
-    let in_bound = effective.iter().filter(|row| row.detected_after_ms.is_some_and(|after| after <= row.bound_ms)).count();
+    let in_bound =
+        effective.iter().filter(|row| row.detected_after_ms.is_some_and(|after| after <= row.bound_ms)).count();
     let mut times: Vec<f64> = effective.iter().filter_map(|row| row.detected_after_ms).collect();
     times.sort_by(f64::total_cmp);
     let of = |verdicts: &[DrawVerdict]| rows.iter().filter(|row| verdicts.contains(&row.verdict)).count();

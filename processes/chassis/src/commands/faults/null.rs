@@ -3,7 +3,7 @@
 use super::draw::run_seed;
 use super::plan::Plan;
 use super::progress;
-use super::watch::{first_trip, watch_for_trips};
+use super::watch::{Seen, first_trip, watch_for_trips};
 use crate::parallel::parallel;
 use crate::rack_run::INTERRUPTED;
 use board::Ns;
@@ -17,9 +17,9 @@ use std::sync::atomic::Ordering;
 const BATCH: usize = 64;
 
 /// The twins of the faults, and runs of `scenario` until the tool has been in contact for the hours asked for.
-pub fn runs(plan: &Plan, scenario: &Scenario, seed: u64, twins: &BTreeMap<u64, Trace>) -> miette::Result<NullRuns> {
+pub fn runs(plan: &Plan, scenario: &Scenario, seed: u64, twins: &BTreeMap<u64, Seen>) -> miette::Result<NullRuns> {
     let mut null = NullRuns::default();
-    for (seed, twin) in twins {
+    for (seed, Seen { trace: twin, .. }) in twins {
         null.runs += 1;
         null.simulated_s += twin.plant.last().map_or(0.0, |probe| seconds(probe.t));
         null.contact_s += seconds(contact(twin));

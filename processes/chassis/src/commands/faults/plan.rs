@@ -64,11 +64,13 @@ pub struct Effect {
     pub angle_rad: f64,
     /// Instant of a job, age of its values (ms); a job that is missing differs by any amount.
     pub time_ms: f64,
+    /// Number of transfers over the bus; none: whatever it is.
+    pub transfers: Option<f64>,
 }
 
 impl Default for Effect {
     fn default() -> Self {
-        Effect { force_n: 2.0, torque_nm: 2.0, angle_rad: 1e-3, time_ms: 0.5 }
+        Effect { force_n: 2.0, torque_nm: 2.0, angle_rad: 1e-3, time_ms: 0.5, transfers: None }
     }
 }
 
@@ -102,6 +104,9 @@ pub struct Kind {
     /// How long it lasts (s); default: to the end.
     #[serde(default)]
     pub duration_s: Option<f64>,
+    /// When in the control period it begins (ms); default: at any time.
+    #[serde(default)]
+    pub in_period_ms: Option<[f64; 2]>,
     /// Phases in which it begins; default: all.
     #[serde(default)]
     pub phases: Option<Vec<String>>,
@@ -219,9 +224,7 @@ impl Plan {
         for (i, kind) in plan.kinds.iter().enumerate() {
             plan.check_faults(i, kind, document).map_err(|problem| source.error(&problem))?;
         }
-        plan.null_document(document).map_err(|error| {
-            source.error(&Problem::new("null.set", error.to_string()))
-        })?;
+        plan.null_document(document).map_err(|error| source.error(&Problem::new("null.set", error.to_string())))?;
         Ok(plan)
     }
 
@@ -289,6 +292,10 @@ impl Plan {
             }
             within(key("detect.periods"), kind.detect.periods, 0.0, 1e4)?;
             within(key("detect.ms"), kind.detect.ms, 0.0, 1e5)?;
+            if let Some([least, most]) = kind.in_period_ms {
+                within(key("in_period_ms.0"), least, 0.0, most)?;
+                within(key("in_period_ms.1"), most, least, super::judge::control_period_ms(scenario))?;
+            }
             if kind.detect.grows_to.is_some() && kind.amount[0] <= 0.0 {
                 return Err(Problem::new(key("amount"), "expected more than 0: the fault is to grow"));
             }
@@ -312,7 +319,10 @@ impl Plan {
             fault.insert("start_s".into(), Value::Float(0.0));
             fault.insert("amount".into(), Value::Float(amount));
             if let Some(axes) = axes {
-                fault.insert("axes".into(), Value::Array(axes.iter().map(|axis| Value::Integer((*axis).into())).collect()));
+                fault.insert(
+                    "axes".into(),
+                    Value::Array(axes.iter().map(|axis| Value::Integer((*axis).into())).collect()),
+                );
             }
             if let Some(duration) = self.kinds[i].duration_s {
                 fault.insert("duration_s".into(), Value::Float(duration));
@@ -330,7 +340,10 @@ impl Plan {
         }
         for (key, fault) in faults {
             let tried = document.with("fault", Value::Array(vec![fault])).and_then(|document| document.scenario());
-            if let Err(ScenarioError::Override { key: of, message, .. } | ScenarioError::Text { key: of, message, .. }) = tried {
+            if let Err(
+                ScenarioError::Override { key: of, message, .. } | ScenarioError::Text { key: of, message, .. },
+            ) = tried
+            {
                 // `fault.0.amount` is this kind's `amount`
                 let stated = match of.strip_prefix("fault.0.") {
                     Some("target") | None => key,

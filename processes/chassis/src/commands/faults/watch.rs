@@ -8,24 +8,33 @@ use pacing::{Context, Flow, Lockstep, Observer, RunError};
 use report::Trace;
 use scenario::Scenario;
 use std::sync::atomic::Ordering;
-use vme::Log;
+use vme::{Log, Origin};
 
 /// A run goes on for so long after all brakes have engaged.
 const SETTLE: Ns = 200 * vme::MILLISECOND;
 /// All brakes engaged.
 const ALL_BRAKES: u32 = drive_status::BRAKE_ENGAGED;
 
+/// What a watched run leaves.
+#[derive(Debug, Default)]
+pub struct Seen {
+    /// Probes and events.
+    pub trace: Trace,
+    /// When each transfer over the bus ended that a program made, ns.
+    pub transfers: Vec<Ns>,
+}
+
 /// Runs a scenario to `end`, or until the arm has been on its brakes for a while after `fault`. In this process, or with a
 /// process for each board.
-pub fn watch(scenario: Scenario, fault: Ns, end: Ns, processes: bool) -> Result<Trace, String> {
-    let mut watcher = Watcher { trace: Trace::default(), fault, braked: None };
+pub fn watch(scenario: Scenario, fault: Ns, end: Ns, processes: bool) -> Result<Seen, String> {
+    let mut watcher = Watcher { seen: Seen::default(), fault, braked: None };
     let scenario = if processes {
         scenario
     } else {
         Scenario { processes: vec![rack_run::everything_in_the_chassis()], ..scenario }
     };
     run(scenario, end, &mut watcher).map_err(|error| error.to_string())?;
-    Ok(watcher.trace)
+    Ok(watcher.seen)
 }
 
 /// Runs a scenario without a fault in this process; returns the time that the tool was in contact, and the first thing
@@ -46,15 +55,17 @@ fn run(scenario: Scenario, end: Ns, observer: &mut dyn Observer) -> Result<(), R
 }
 
 struct Watcher {
-    trace: Trace,
+    seen: Seen,
     fault: Ns,
     /// Since when all brakes are engaged.
     braked: Option<Ns>,
 }
 
 impl Observer for Watcher {
-    fn window(&mut self, until: Ns, mail: &Mail, _log: &Log) -> Flow {
-        self.trace.window(&mail.plant_probe, &mail.control_probe, &mail.events);
+    fn window(&mut self, until: Ns, mail: &Mail, log: &Log) -> Flow {
+        self.seen.trace.window(&mail.plant_probe, &mail.control_probe, &mail.events);
+        let programs = log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program);
+        self.seen.transfers.extend(programs.map(|transfer| transfer.done));
         let mut flow = Flow::Continue;
         for probe in &mail.plant_probe {
             match is_braked(probe) {
@@ -65,7 +76,9 @@ impl Observer for Watcher {
                 flow = Flow::Stop;
             }
         }
-        if self.braked.is_some_and(|since| until >= since.max(self.fault) + SETTLE) || INTERRUPTED.load(Ordering::Relaxed) {
+        if self.braked.is_some_and(|since| until >= since.max(self.fault) + SETTLE)
+            || INTERRUPTED.load(Ordering::Relaxed)
+        {
             flow = Flow::Stop;
         }
         flow

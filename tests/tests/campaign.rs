@@ -84,7 +84,7 @@ fn a_kind_with_too_few_effective_faults_is_not_shown_and_fails_a_whole_campaign_
 fn bad_campaigns_and_kinds_are_refused_with_their_key() {
     let bench = Bench::new();
     bench.write("bad.toml", SMALL.replace("watch_s = 0.4", "watch_s = -1.0"));
-    let refused = |arguments: &[&str]| bench.run(&[&["faults", "--out", "out"], arguments].concat()).expect_code(2);
+    let refused = |arguments: &[&str]| bench.run(&[&["faults", "--out", "out"][..], arguments].concat()).expect_code(2);
     refused(&["--campaign", "bad.toml"]).expect_message("bad.toml:5: watch_s: is -1");
     refused(&["--kinds", "stick"]).expect_message("--kinds: stick: there is no such kind");
     refused(&["failures", "--set", "fault=[{target='bus', kind='stuck-bus', start_s=1.0}]"])

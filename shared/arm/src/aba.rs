@@ -69,7 +69,7 @@ pub(crate) fn aba_in(
     let mut n = -v3(f_tip[3], f_tip[4], f_tip[5]);
     for i in (0..DOF).rev() {
         let (s, z) = (lane(&screws.s, i), lane(&screws.r, i).z);
-        art.add_body(lane(&bodies.mass, i), lane(&bodies.first, i), lane(&bodies.second, i).complement());
+        art.add_body(lane(&bodies.first, i), lane(&bodies.second, i).complement());
         f += lane(&needed.f, i);
         n += lane(&needed.n, i);
 
@@ -99,13 +99,10 @@ pub(crate) fn aba_in(
 }
 
 impl Articulated {
-    /// With a rigid body of mass `m`, first moment `h` and inertia tensor `i`.
+    /// With a rigid body of first moment `h` and inertia tensor `i`; base parameters have no mass.
     #[inline(always)]
-    fn add_body(&mut self, m: f64, h: V3, i: Sym3) {
-        self.a.xx += m;
-        self.a.yy += m;
-        self.a.zz += m;
-        // force = m a − h × dω
+    fn add_body(&mut self, h: V3, i: Sym3) {
+        // force = −h × dω
         self.b.x += v3(0.0, -h.z, h.y);
         self.b.y += v3(h.z, 0.0, -h.x);
         self.b.z += v3(-h.y, h.x, 0.0);

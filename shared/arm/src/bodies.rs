@@ -1,4 +1,4 @@
-//! The links' masses about the tip: what Newton–Euler, composite and articulated bodies start from.
+//! The links' moments of mass about the tip: what Newton–Euler, composite and articulated bodies start from.
 //!
 //! All links are referred to one point, the tip, in base axes. So bodies that move together are merged by addition, a
 //! wrench passes from link to link unchanged, and the joint axes are the columns of the Jacobian.
@@ -8,16 +8,16 @@ use crate::lanes::{Lanes, PAIRS, Pair};
 use crate::model::ArmModel;
 use crate::small::{M3, Sym3, V3};
 
-/// Masses (kg), first moments (kg m) and second moments (kg m²) of the links about the tip, base axes.
-#[derive(Clone, Copy, Debug, Default)]
+/// First moments (kg m) and second moments (kg m²) of the links about the tip, base axes. Base parameters (`chain`): no
+/// link has a mass, its part of the first moments does not depend on the point of reference.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Bodies {
-    pub mass: [Pair; PAIRS],
     pub first: [V3<Pair>; PAIRS],
     pub second: [Sym3<Pair>; PAIRS],
 }
 
-/// Forces (N) and moments about the tip (Nm).
-#[derive(Clone, Copy, Debug, Default)]
+/// Forces (N) and moments about the tip (Nm) on the base parameters: only their components along the joints are physical.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Wrenches {
     pub f: [V3<Pair>; PAIRS],
     pub n: [V3<Pair>; PAIRS],
@@ -27,39 +27,37 @@ impl Bodies {
     #[inline(always)]
     pub fn new(model: &ArmModel, screws: &Screws) -> Bodies {
         let chain = &model.chain;
-        let mut bodies = Bodies { mass: chain.mass, ..Bodies::default() };
-        for k in 0..PAIRS {
-            let (m, d, r) = (chain.mass[k], screws.d[k], screws.r[k]);
-            let turned = r * chain.first[k];
-            let by_distance = d * m;
-            bodies.first[k] = turned + by_distance;
-            bodies.second[k] = chain.second[k].rotated(r) + Sym3::outer_sum(d, turned + by_distance * Pair::splat(0.5));
-        }
-        bodies
+        let half = Pair::splat(0.5);
+        let first = std::array::from_fn(|k| screws.r[k].x * chain.first[k].x + screws.r[k].y * chain.first[k].y);
+        let second = std::array::from_fn(|k| {
+            let (h, i, d, M3 { x, y, z }) = (chain.first[k], chain.second[k], screws.d[k], screws.r[k]);
+            // R i Rᵀ + d (R h)ᵀ + (R h) dᵀ, ordered by the axes; i.zz and h.z are nothing
+            Sym3::outer_sum(x, x * (i.xx * half) + y * i.xy + z * i.xz + d * h.x)
+                + Sym3::outer_sum(y, y * (i.yy * half) + z * i.yz + d * h.y)
+        });
+        Bodies { first, second }
     }
 
     /// What each link on its own needs to move like this, gravity included.
     #[inline(always)]
     pub fn wrenches(&self, gravity: V3, motion: &Motion) -> Wrenches {
         let up = V3::pair(-gravity, -gravity);
-        let mut out = Wrenches::default();
-        for k in 0..PAIRS {
-            let w = motion.w[k];
-            let a = motion.a[k] + w.cross(motion.v[k]) + up;
-            let spin = spin_matrix(w, motion.dw[k]);
+        let spin: [M3<Pair>; PAIRS] = std::array::from_fn(|k| spin_matrix(motion.w[k], motion.dw[k]));
+        let f = std::array::from_fn(|k| spin[k] * self.first[k]);
+        let n = std::array::from_fn(|k| {
+            let a = motion.a[k] + motion.w[k].cross(motion.v[k]) + up;
             let (h, i) = (self.first[k], self.second[k]);
-            out.f[k] = a * self.mass[k] + spin * h;
             // moment of spin·x dm over x: the antisymmetric part of spin·second moments
             let of = |row: V3<Pair>, x: Pair, y: Pair, z: Pair| row.x * x + row.y * y + row.z * z;
-            let (rx, ry, rz) = rows(spin);
+            let (rx, ry, rz) = rows(spin[k]);
             let n = V3 {
                 x: of(rz, i.xy, i.yy, i.yz) - of(ry, i.xz, i.yz, i.zz),
                 y: of(rx, i.xz, i.yz, i.zz) - of(rz, i.xx, i.xy, i.xz),
                 z: of(ry, i.xx, i.xy, i.xz) - of(rx, i.xy, i.yy, i.yz),
             };
-            out.n[k] = n + h.cross(a);
-        }
-        out
+            n + h.cross(a)
+        });
+        Wrenches { f, n }
     }
 }
 

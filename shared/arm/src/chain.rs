@@ -3,6 +3,10 @@
 //! A fixed rotation between two joint axes is Rz(a) Rx(b) Rz(c) whatever it is. Turning each joint frame about its own
 //! axis takes the outer two into the joint angles: what remains between two frames is a turn about x. Link i's inertia
 //! and the origin of the next frame are given in these turned frames, the inertias two at a time.
+//!
+//! The inertias are the base parameters (Khalil and Dombre): a mass on a joint's axis does not feel the joint, so what of
+//! a link is equal to a rod on its joint's axis is counted with the link before. Neither torques nor energy differ, and
+//! of a link's ten parameters seven remain.
 
 use crate::inertia::Inertia;
 use crate::lanes::{PAIRS, Pair, paired};
@@ -24,17 +28,26 @@ pub(crate) struct Chain {
     /// Tip in frame 7.
     pub tip_r: M3,
     pub tip_p: V3,
-    /// Masses (kg), first moments (kg m) and second moments (kg m²) of the links about their frames' origins; nothing
-    /// in the tip's lane.
-    pub mass: [Pair; PAIRS],
+    /// First moments (kg m) and second moments (kg m²) of the links about their frames' origins, less what sits on the
+    /// joint's axis: no mass, and nothing along z alone. Nothing in the tip's lane.
     pub first: [V3<Pair>; PAIRS],
     pub second: [Sym3<Pair>; PAIRS],
+    /// First moment of what never moves: all that sits on axis 1, base axes about the base's origin (kg m).
+    pub fixed: V3,
+}
+
+/// Moments of a body's mass about the origin of the frame it is given in.
+#[derive(Clone, Copy, Default)]
+struct Moments {
+    mass: f64,
+    first: V3,
+    second: Sym3,
 }
 
 impl Chain {
     pub fn of(model: &ArmModel) -> Chain {
         let mut chain = Chain::default();
-        let mut bodies = [Inertia::default(); DOF + 1];
+        let mut bodies = [Moments::default(); DOF + 1];
         let mut parts = model.joints.each_ref().map(|joint| zxz(joint.r));
         // the first frame is the base's and stays
         chain.base = about_z(parts[0].0) * about_x(parts[0].1);
@@ -45,13 +58,43 @@ impl Chain {
             chain.offset[i] = after + next;
             chain.twist[i] = (libm::cos(twist), libm::sin(twist));
             chain.p[i] = about_z(-own) * model.joints[i].p;
-            bodies[i] = model.joints[i].body.turned(about_z(-next));
+            bodies[i] = Moments::of(&model.joints[i].body.turned(about_z(-next)));
         }
+        for i in (1..DOF).rev() {
+            let (cos, sin) = chain.twist[i];
+            let rod = bodies[i].take_rod(chain.p[i], v3(0.0, -sin, cos));
+            bodies[i - 1].add(&rod);
+        }
+        chain.fixed = bodies[0].take_rod(chain.p[0], chain.base.z).first;
         (chain.tip_r, chain.tip_p) = (model.tip_r, model.tip_p);
-        chain.mass = paired(&bodies.map(|body| body.m));
-        chain.first = paired(&bodies.map(|body| body.h));
-        chain.second = paired(&bodies.map(|body| body.i.second_moments()));
+        chain.first = paired(&bodies.map(|body| body.first));
+        chain.second = paired(&bodies.map(|body| body.second));
         chain
+    }
+}
+
+impl Moments {
+    fn of(body: &Inertia) -> Moments {
+        Moments { mass: body.m, first: body.h, second: body.i.second_moments() }
+    }
+
+    /// Takes out what is equal to a rod on the z axis; returns the rod as seen from a frame in which that axis passes
+    /// through `p` in the direction `z`.
+    fn take_rod(&mut self, p: V3, z: V3) -> Moments {
+        let mass = std::mem::take(&mut self.mass);
+        let first = std::mem::take(&mut self.first.z);
+        let second = std::mem::take(&mut self.second.zz);
+        Moments {
+            mass,
+            first: p * mass + z * first,
+            second: Sym3::outer_sum(p, p * (0.5 * mass) + z * first) + Sym3::outer_sum(z, z * (0.5 * second)),
+        }
+    }
+
+    fn add(&mut self, b: &Moments) {
+        self.mass += b.mass;
+        self.first += b.first;
+        self.second = self.second + b.second;
     }
 }
 
@@ -77,7 +120,7 @@ fn about_x(angle: f64) -> M3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rotation;
+    use crate::{ArmState, rotation};
     use nalgebra::{Matrix3, Vector3};
 
     #[test]
@@ -95,5 +138,18 @@ mod tests {
             let back: Matrix3<f64> = (about_z(a) * about_x(b) * about_z(c)).into();
             assert!((back - r).amax() < 1e-15, "{v:?}");
         }
+    }
+
+    #[test]
+    fn with_whichever_link_it_is_counted_all_mass_weighs_at_its_place() {
+        let (model, q) = (ArmModel::rediestro(), JointVector::from([0.3, -1.0, 0.7, 1.9, -0.4, 0.8, 2.2]));
+        let (mut r, mut p, mut moment) = (M3::IDENTITY, V3::ZERO, V3::ZERO);
+        for (joint, q) in model.joints.iter().zip(&q) {
+            p += r * joint.p;
+            r = r * joint.r * about_z(*q);
+            moment += p * joint.body.m + r * joint.body.h;
+        }
+        let energy = ArmState::new(&model, &q, &JointVector::zeros()).potential_energy();
+        assert!((energy + model.gravity.dot(moment)).abs() < 1e-11, "{energy} J");
     }
 }

@@ -27,25 +27,27 @@ pub(crate) fn crba_in(model: &ArmModel, screws: &Screws) -> JointMatrix {
 /// Rows of M from the diagonal on; what stands before the diagonal, or in the tip's lane, means nothing.
 #[inline(always)]
 pub(crate) fn mass_rows(screws: &Screws, links: Bodies) -> [[Pair; PAIRS]; DOF] {
-    let mut composite = links;
-    sum_from_tip(&mut composite.mass);
-    sum_from_tip(&mut composite.first);
-    sum_from_tip(&mut composite.second);
+    let Bodies { mut first, mut second } = links;
+    sum_from_tip(&mut first);
+    sum_from_tip(&mut second);
     // momentum rates of the composites about the tip, each for its own joint's unit acceleration
-    let mut p = [V3::<Pair>::default(); PAIRS];
-    let mut l = [V3::<Pair>::default(); PAIRS];
-    for k in 0..PAIRS {
-        let (s, z) = (screws.s[k], screws.r[k].z);
-        let (m, h, i) = (composite.mass[k], composite.first[k], composite.second[k]);
-        p[k] = s * m + z.cross(h);
-        l[k] = z * i.trace() - i * z + h.cross(s);
-    }
+    let p: [V3<Pair>; PAIRS] = std::array::from_fn(|k| screws.r[k].z.cross(first[k]));
+    let l: [V3<Pair>; PAIRS] = std::array::from_fn(|k| {
+        let (s, z, i) = (screws.s[k], screws.r[k].z, second[k]);
+        z * i.trace() - i * z + first[k].cross(s)
+    });
     let mut rows = [[Pair::default(); PAIRS]; DOF];
-    for j in 0..DOF {
+    for j in 0..PAIRS {
         let (s, z) = (lane(&screws.s, j), lane(&screws.r, j).z);
         let (s, z) = (V3::pair(s, s), V3::pair(z, z));
         for k in 0..PAIRS {
             rows[j][k] = s.dot(p[k]) + z.dot(l[k]);
+        }
+    }
+    // the last joints among themselves are the high lanes of pairs with pairs
+    for j in 0..DOF - PAIRS {
+        for k in 0..DOF - PAIRS {
+            rows[j + PAIRS][k] = screws.s[j].dot(p[k]) + screws.r[j].z.dot(l[k]);
         }
     }
     rows

@@ -73,7 +73,8 @@ fn eliminate(rows: &mut [[Pair; PAIRS]; DOF], inverse: &mut [f64; DOF], k: usize
 #[inline(always)]
 fn substitute(rows: &[[Pair; PAIRS]; DOF], inverse: &[f64; DOF], x: &mut JointVector, k: usize) {
     let mut rest = lane(&rows[k], DOF);
-    for i in k + 1..DOF {
+    // the newest unknown last: only that one is waited for
+    for i in (k + 1..DOF).rev() {
         rest -= lane(&rows[k], i) * x[i];
     }
     x[k] = rest * inverse[k];

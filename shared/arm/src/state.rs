@@ -11,7 +11,6 @@ use crate::kinematics::{Frames, Motion, Pose, Screws, TipMotion, tip_motion_of};
 use crate::lanes::{lane, sum_from_tip};
 use crate::model::ArmModel;
 use crate::rnea::rnea_in;
-use crate::small::V3;
 use crate::{Jacobian, JointMatrix, JointVector, Spatial};
 
 /// An arm at angles q and speeds q̇.
@@ -114,11 +113,9 @@ impl<'m> ArmState<'m> {
         match &self.model.slide {
             Some(slide) => -slide.mass * self.model.gravity.z * self.q[0],
             None => {
-                let Bodies { mut mass, mut first, .. } = Bodies::new(self.model, &self.screws);
-                sum_from_tip(&mut mass);
+                let Bodies { mut first, .. } = Bodies::new(self.model, &self.screws);
                 sum_from_tip(&mut first);
-                let moment = lane(&first, 0) + V3::from(self.pose.p) * lane(&mass, 0);
-                -self.model.gravity.dot(moment)
+                -self.model.gravity.dot(lane(&first, 0) + self.model.chain.fixed)
             }
         }
     }

@@ -127,7 +127,7 @@ impl EncoderIf {
                 self.channels.follow(&sample.position);
             }
         }
-        self.channels.follow(&core::array::from_fn(|joint| self.history.position(joint, t)));
+        self.channels.follow(&self.history.positions(t));
         self.followed = t;
     }
 

@@ -109,6 +109,33 @@ impl History {
             .unwrap_or(0.0)
     }
 
+    /// Angles of all shafts at `t`, in counts, not rounded.
+    pub fn positions(&self, t: f64) -> PerJoint {
+        let next = self.until(t);
+        let before = next.checked_sub(1).and_then(|i| self.samples.get(i));
+        match (before, self.samples.get(next)) {
+            (Some(a), Some(b)) => {
+                let share = (t - a.t) / (b.t - a.t);
+                core::array::from_fn(|i| a.position[i] + share * (b.position[i] - a.position[i]))
+            }
+            (Some(only), None) | (None, Some(only)) => only.position,
+            (None, None) => PerJoint::default(),
+        }
+    }
+
+    /// Number of the newest sample before number `end` in which a shaft is outside [`cell`, `cell` + 1).
+    pub fn last_outside(&self, joint: usize, cell: f64, end: usize) -> Option<usize> {
+        let outside = |sample: &Shafts| {
+            let x = sample.position[joint];
+            x < cell || x >= cell + 1.0
+        };
+        // the halves of the ring one after the other: nothing to wrap in the loop
+        let (old, new) = self.samples.as_slices();
+        let of_old = &old[..end.min(old.len())];
+        let of_new = &new[..end.saturating_sub(old.len()).min(new.len())];
+        (of_new.iter().rposition(outside).map(|i| i + old.len())).or_else(|| of_old.iter().rposition(outside))
+    }
+
     fn interpolate(&self, t: f64, value: impl Fn(&Shafts) -> f64) -> Option<f64> {
         let next = self.until(t);
         let before = next.checked_sub(1).and_then(|i| self.samples.get(i));

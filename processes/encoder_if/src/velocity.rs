@@ -80,26 +80,25 @@ impl<'a> Past<'a> {
 
     /// The next older edge.
     fn edge(&mut self) -> Option<Edge> {
-        while self.at.t >= self.limit {
-            let from = self
-                .history
-                .point(self.joint, self.samples.checked_sub(1)?)?;
-            if let Some(edge) = edge(self.at, from, self.cell) {
-                self.at = Point {
-                    t: edge.t,
-                    x: edge.line,
-                };
-                // before the edge the shaft was on its other side
-                self.cell = if edge.line == self.cell {
-                    self.cell - 1.0
-                } else {
-                    edge.line
-                };
-                return (edge.t >= self.limit).then_some(edge);
-            }
-            self.at = from;
-            self.samples -= 1;
+        let outside = self.history.last_outside(self.joint, self.cell, self.samples)?;
+        if outside + 1 < self.samples {
+            self.at = self.history.point(self.joint, outside + 1)?;
+            self.samples = outside + 1;
         }
-        None
+        if self.at.t < self.limit {
+            return None;
+        }
+        let edge = edge(self.at, self.history.point(self.joint, outside)?, self.cell)?;
+        self.at = Point {
+            t: edge.t,
+            x: edge.line,
+        };
+        // before the edge the shaft was on its other side
+        self.cell = if edge.line == self.cell {
+            self.cell - 1.0
+        } else {
+            edge.line
+        };
+        (edge.t >= self.limit).then_some(edge)
     }
 }

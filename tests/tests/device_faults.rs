@@ -177,7 +177,7 @@ fn an_old_command_holds_the_arm_and_an_impossible_one_is_refused() {
 }
 
 #[test]
-fn a_sound_run_of_each_built_in_scenario_makes_no_detector_fire() {
+fn sound_runs_of_seven_built_in_tasks_make_no_detector_fire() {
     use rack_tests::Bench;
     for name in
         ["table-5-3", "figure-6-3", "after-6-6", "surface-cleaning", "peg-in-hole", "self-motion", "joint-limits"]

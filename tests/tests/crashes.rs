@@ -1,5 +1,6 @@
-//! Processes killed and stopped for real, at drawn moments: the run ends with exit code 1 and a message that names the
-//! process, its record is readable up to there, and nothing is left on the machine.
+//! Processes killed and stopped for real, at drawn moments. One that control needs ends the run with exit code 1 and a
+//! message that names it; workstation and recorder are started again, and the run ends with exit code 3. The record is
+//! readable, and nothing is left on the machine.
 //!
 //! Every run is under the bench's watchdog of 60 s and prints the time that its end took. `scripts/soak.sh` runs the long
 //! versions.
@@ -10,14 +11,21 @@ use std::time::Duration;
 /// Where the runs record.
 const RECORD: &str = "out/nominal.mcap";
 
-const PROCESSES: [&str; 7] =
-    ["hw_sim", "da_io", "force_sensor_if", "encoder_if", "control_computer", "workstation", "bus_analyzer"];
+/// Their loss ends the run.
+const NEEDED: [&str; 5] = ["hw_sim", "da_io", "force_sensor_if", "encoder_if", "control_computer"];
+/// The run goes on without them.
+const DISPENSABLE: [&str; 2] = ["workstation", "bus_analyzer"];
 
 /// Starts a run that would last very long, and lets it go on for `delay` after its processes have started.
 fn start(bench: &Bench, delay: Duration) -> Running {
+    start_for(bench, "30000", delay)
+}
+
+/// The same with so many simulated seconds.
+fn start_for(bench: &Bench, seconds: &str, delay: Duration) -> Running {
     let scenario = bench.scenario("long.toml", &[]);
-    let mut run = bench.start(&["run", scenario, "--duration", "30000", "--out", "out"]);
-    run.wait_for_processes(PROCESSES.len());
+    let mut run = bench.start(&["run", scenario, "--duration", seconds, "--out", "out"]);
+    run.wait_for_processes(NEEDED.len() + DISPENSABLE.len());
     run.pause(delay);
     run
 }
@@ -74,16 +82,33 @@ fn harm(name: &str, with: Signal, delay: Duration) {
     // a moment at which the record has hardly begun tells nothing
     if reached > 0.1 {
         let recorded = recorded_s(&bench);
-        // whoever kills the recorder loses the chunk that it was filling
-        let lost = if name == "bus_analyzer" { f64::MAX } else { 0.05 };
-        assert!(recorded > 0.0 && recorded >= reached - lost, "record up to {recorded} s, run up to {reached} s");
+        assert!(recorded > 0.0 && recorded >= reached - 0.05, "record up to {recorded} s, run up to {reached} s");
+    }
+}
+
+/// The same with a process that the run goes on without: it is started again.
+fn harm_and_go_on(name: &str, with: Signal, delay: Duration) {
+    let bench = Bench::new();
+    let mut run = start_for(&bench, "12", delay);
+    let victim = run.processes().into_iter().find(|process| process.name == name);
+    let victim = victim.unwrap_or_else(|| panic!("no process `{name}`"));
+    run.mark();
+    signal(victim.pid, with);
+    let outcome = run.wait().expect_code(3).expect_nothing_left();
+    let outcome = outcome.expect_message(&format!("process `{name}`")).expect_message("it is started again");
+    println!("{name}, {with:?} after {delay:?}: at {} s of simulated time", simulated_s(&outcome.stderr));
+    recorded_s(&bench);
+    let second = "out/nominal.part2.mcap";
+    assert_eq!(bench.path(second).exists(), name == "bus_analyzer");
+    if name == "bus_analyzer" {
+        bench.digest_of(second);
     }
 }
 
 #[test]
 fn a_killed_process_ends_the_run_with_its_name() {
     let mut draw = Draw::new(1);
-    for name in PROCESSES {
+    for name in NEEDED {
         harm(name, Signal::KILL, drawn_delay(&mut draw));
     }
 }
@@ -94,8 +119,23 @@ fn a_stopped_process_ends_the_run_with_its_name() {
 }
 
 #[test]
-fn a_stopped_recorder_ends_the_run_with_its_name() {
-    harm("bus_analyzer", Signal::STOP, Duration::from_millis(1200));
+fn workstation_and_recorder_are_started_again_and_the_run_ends_with_losses() {
+    harm_and_go_on("workstation", Signal::KILL, Duration::from_millis(150));
+    harm_and_go_on("bus_analyzer", Signal::KILL, Duration::from_millis(250));
+    harm_and_go_on("bus_analyzer", Signal::STOP, Duration::from_millis(200));
+}
+
+#[test]
+fn a_recorder_that_is_not_to_be_started_again_ends_the_run() {
+    let bench = Bench::new();
+    let scenario = bench.scenario("long.toml", &[]);
+    let arguments = ["run", scenario, "--duration", "30000", "--restart", "bus_analyzer=never", "--out", "out"];
+    let mut run = bench.start(&arguments);
+    let processes = run.wait_for_processes(7);
+    let recorder = processes.iter().find(|process| process.name == "bus_analyzer").expect("recorder").pid;
+    run.pause(Duration::from_millis(400));
+    signal(recorder, Signal::KILL);
+    expect_failure_of(run.wait(), "bus_analyzer");
 }
 
 #[test]
@@ -105,9 +145,12 @@ fn every_process_killed_and_stopped_at_many_moments() {
     let mut draw = Draw::new(2);
     for round in 0..rounds {
         println!("round {round}");
-        for name in PROCESSES {
-            for with in [Signal::KILL, Signal::STOP] {
+        for with in [Signal::KILL, Signal::STOP] {
+            for name in NEEDED {
                 harm(name, with, drawn_delay(&mut draw));
+            }
+            for name in DISPENSABLE {
+                harm_and_go_on(name, with, drawn_delay(&mut draw) / 5);
             }
         }
     }

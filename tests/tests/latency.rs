@@ -57,9 +57,7 @@ impl Observer for Listener {
 fn context() -> Context {
     let settings = [format!("rack.tasks.control.period_ns={PERIOD}")];
     let scenario = scenario::load("table-5-3", &settings).and_then(|document| document.scenario()).expect("scenario");
-    let processes = vec![chassis::rack_run::everything_in_the_chassis()];
-    let scenario = scenario::Scenario { processes, ..scenario };
-    Context { prefix: String::new(), variant: "nominal".into(), record: None, measure: true, scenario }
+    Context { prefix: String::new(), variant: "nominal".into(), record: None, measure: true, in_process: true, scenario }
 }
 
 fn factory(simulated: Ns, real: Duration) -> impl Fn(BoardId, &Context) -> Result<Box<dyn Board>, String> {

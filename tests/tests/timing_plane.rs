@@ -57,8 +57,7 @@ impl Observer for Windows {
 }
 
 /// Runs the scenario for `seconds`, with these spies.
-fn run(mut scenario: Scenario, seconds: f64, spies: &[(BoardId, fn(&Inputs, &mut Outputs, &mut Seen))]) -> Seen {
-    scenario.processes = vec![chassis::rack_run::everything_in_the_chassis()];
+fn run(scenario: Scenario, seconds: f64, spies: &[(BoardId, fn(&Inputs, &mut Outputs, &mut Seen))]) -> Seen {
     let notes = Notes::default();
     let factory = |role: BoardId, context: &Context| -> Result<Box<dyn Board>, String> {
         let board = chassis::boards::build(role, context)?;
@@ -67,7 +66,7 @@ fn run(mut scenario: Scenario, seconds: f64, spies: &[(BoardId, fn(&Inputs, &mut
             None => board,
         })
     };
-    let context = Context { prefix: String::new(), variant: "nominal".into(), record: None, measure: false, scenario };
+    let context = Context { prefix: String::new(), variant: "nominal".into(), record: None, measure: false, in_process: true, scenario };
     let mut rack = Lockstep::power_up(context, &factory, &|_| Vec::new(), &INTERRUPTED).expect("power-up");
     rack.run(scenario::nanoseconds(seconds), &mut Windows(Arc::clone(&notes))).expect("run");
     rack.finish().expect("end");

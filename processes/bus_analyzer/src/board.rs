@@ -78,14 +78,14 @@ impl BusAnalyzer {
         self.lost.as_ref()
     }
 
-    fn describe(&mut self) {
+    fn describe(&mut self, t: Ns) {
         self.cdr.begin();
         self.cdr.string(&self.urdf);
-        self.emit(Topic::RobotDescription, 0);
+        self.emit(Topic::RobotDescription, t);
         self.cdr.begin();
         let task = (&self.task_position, &self.task_orientation);
-        encode::transforms(&mut self.cdr, 0, &self.base_link, &[(encode::TASK_FRAME, task)]);
-        self.emit(Topic::TfStatic, 0);
+        encode::transforms(&mut self.cdr, t, &self.base_link, &[(encode::TASK_FRAME, task)]);
+        self.emit(Topic::TfStatic, t);
     }
 
     fn plant(&mut self, probe: &PlantProbe) {
@@ -174,7 +174,7 @@ impl Board for BusAnalyzer {
             digest.advance(inputs.from);
         }
         if inputs.boot {
-            self.describe();
+            self.describe(inputs.until);
         }
         let mail = &inputs.mail;
         for probe in &mail.plant_probe {

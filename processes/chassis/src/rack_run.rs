@@ -8,7 +8,7 @@ use messages::{EventKind, Severity, Span, drive_status};
 use pacing::{Context, Flow, Lockstep, Observer, Realtime, RunError};
 use report::latency::{Clock, Journal, Measurement};
 use report::{Accounting, BusAccount, Ended, Ledger, Trace, VariantResult};
-use scenario::{Process, Scenario, Variant};
+use scenario::{Scenario, Variant};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, LazyLock};
@@ -61,6 +61,8 @@ pub struct Finished {
     pub error: Option<RunError>,
     /// The record is incomplete: it could not be written to its end.
     pub record_lost: bool,
+    /// What else was lost although the run went on, in words.
+    pub losses: Vec<String>,
     /// Wall time from the start to the first window.
     pub start_up: Duration,
     /// Wall time of the windows.
@@ -93,6 +95,7 @@ pub fn run(
         reached: 0,
         diverged: false,
         record_lost: false,
+        losses: Vec::new(),
         windows: 0,
         start_up: Duration::ZERO,
         ended: Duration::ZERO,
@@ -113,7 +116,8 @@ pub fn run(
         result.measured.clone_from(&measurement.rows);
     }
     result.wall_s = Some(windows.as_secs_f64());
-    Ok(Finished { result, error, record_lost: witness.record_lost, start_up: witness.start_up, windows, measurement })
+    let Witness { record_lost, losses, start_up, .. } = witness;
+    Ok(Finished { result, error, record_lost, losses, start_up, windows, measurement })
 }
 
 fn carry_out(
@@ -122,17 +126,15 @@ fn carry_out(
     setting: &Setting,
     witness: &mut Witness<'_>,
 ) -> Result<(), RunError> {
-    let mut scenario = scenario.clone();
-    if setting.in_process {
-        scenario.processes = vec![everything_in_the_chassis()];
-    }
+    let scenario = scenario.clone();
     let end = scenario.duration_ns();
     let measure = match setting.pacing {
         Pacing::Lockstep => setting.measure,
         Pacing::Realtime => scenario.realtime.measure,
     };
     let (variant, record) = (variant.name.clone(), setting.record.clone());
-    let context = Context { prefix: String::new(), variant, record, measure, scenario };
+    let in_process = setting.in_process;
+    let context = Context { prefix: String::new(), variant, record, measure, in_process, scenario };
     match setting.pacing {
         Pacing::Lockstep => {
             let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
@@ -141,6 +143,7 @@ fn carry_out(
             witness.shown = rack.folder().map(Shown::new);
             let ran = rack.run(end, witness);
             witness.ended = witness.start.elapsed();
+            witness.losses = rack.losses().to_vec();
             witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
             ran?;
             rack.finish()
@@ -172,10 +175,11 @@ pub fn rehearse(scenario: &Scenario) -> Result<(Vec<Program>, BusAccount), Strin
 }
 
 /// Runs the start of a scenario in this process, up to `end`, for somebody who listens.
-pub fn listen(scenario: &Scenario, end: Ns, observer: &mut dyn Observer) -> Result<Lockstep, String> {
-    let scenario = Scenario { processes: vec![everything_in_the_chassis()], ..scenario.clone() };
-    let context = Context { prefix: String::new(), variant: String::new(), record: None, measure: false, scenario };
-    let run = || -> Result<Lockstep, RunError> {
+pub fn listen(scenario: &Scenario, end: Ns, observer: &mut dyn Observer) -> Result<Lockstep<'static>, String> {
+    let scenario = scenario.clone();
+    let (prefix, variant) = (String::new(), String::new());
+    let context = Context { prefix, variant, record: None, measure: false, in_process: true, scenario };
+    let run = || -> Result<Lockstep<'static>, RunError> {
         let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
         rack.run(end, observer)?;
         Ok(rack)
@@ -195,12 +199,6 @@ impl Observer for Listener {
     }
 }
 
-/// The process list of a run inside this process.
-pub fn everything_in_the_chassis() -> Process {
-    let boards = messages::BOARDS[1..].iter().map(|board| board.name().to_owned()).collect();
-    Process { name: messages::BOARDS[0].name().to_owned(), boards, ..Process::default() }
-}
-
 /// Collects what a run is measured by, and ends it when the plant has left its domain.
 struct Witness<'a> {
     trace: Trace,
@@ -213,6 +211,7 @@ struct Witness<'a> {
     reached: Ns,
     diverged: bool,
     record_lost: bool,
+    losses: Vec<String>,
     windows: u64,
     start_up: Duration,
     /// Wall time from the start to the end of the last window.

@@ -154,7 +154,7 @@ impl Board for DaIo {
         self.state.absorb(inputs);
         self.saved.copy_from(&self.state);
         if inputs.boot {
-            out.mail.amplifier.push(self.state.cards.outputs(0));
+            out.mail.amplifier.push(self.state.cards.outputs(inputs.until));
         }
 
         let mut transfers = inputs.transfers.iter().peekable();

@@ -233,6 +233,13 @@ mod tests {
     }
 
     #[test]
+    fn a_console_that_is_started_again_goes_on_behind_what_was_accepted() {
+        let mut sender = Sender::new(commands(&[0, 3, 6, 9]), SECOND);
+        assert_eq!(sender.poll(4 * SECOND, Some(2)).send, (2, 2));
+        assert_eq!(sender.poll(5 * SECOND, Some(2)).send, (2, 3));
+    }
+
+    #[test]
     fn a_scenario_without_segments_sends_nothing() {
         let mut sender = Sender::new(Vec::new(), SECOND);
         assert_eq!(sender.poll(0, Some(0)), nothing());

@@ -19,6 +19,8 @@ use BoardId::*;
 pub const ROUTES: &[Route] = &[
     // wires
     Route { from: DaIo, kind: Kind::Amplifier, to: &[HwSim] },
+    // while da_io is down
+    Route { from: Chassis, kind: Kind::Amplifier, to: &[HwSim] },
     Route { from: HwSim, kind: Kind::Plant, to: &[DaIo, ForceSensorIf, EncoderIf] },
     // bus
     Route { from: ControlComputer, kind: Kind::Words, to: &[DaIo, ForceSensorIf, EncoderIf] },

@@ -5,6 +5,7 @@ use crate::page::Page;
 use board::routes::ROUTES;
 use iceoryx2::prelude::*;
 use std::path::{Path as StdPath, PathBuf};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// How long a process waits for another that is opening the same channel.
@@ -17,9 +18,14 @@ const SHARED_MEMORY: &str = "/dev/shm";
 pub struct Domain {
     pub(crate) node: Node<ipc::Service>,
     pub(crate) protocol: u32,
-    /// How many messages each route has carried.
+    /// How many messages each route has carried; behind that, [`DOWN_WORD`] and [`REBORN_WORD`].
     pub(crate) tally: Page,
 }
+
+/// Bits of the boards that are down now: messages need not reach them.
+pub(crate) const DOWN_WORD: usize = ROUTES.len();
+/// Bits of the boards that were started again: their messages may have a gap or a repetition where they died.
+pub(crate) const REBORN_WORD: usize = ROUTES.len() + 1;
 
 impl Domain {
     /// Joins the domain that belongs to a run folder. `prefix` is unique to the run; the folder's path must be short
@@ -47,8 +53,26 @@ impl Domain {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| setup("creating the node", format!("{error:?}")))?;
-        let tally = Page::open(&folder.join("tally"), ROUTES.len())?;
+        let tally = Page::open(&folder.join("tally"), ROUTES.len() + 2)?;
         Ok(Domain { node, protocol: messages::PROTOCOL, tally })
+    }
+
+    /// From now on messages need not reach these boards (a bit each, by number), and only these.
+    pub fn set_down(&self, boards: u32) {
+        self.tally.word(DOWN_WORD).store(boards, Ordering::SeqCst);
+    }
+
+    /// Removes what dead processes have left in the domain, so that others may take their places, which are those of
+    /// `boards`. For the chassis alone.
+    pub fn clean_dead(&self, boards: u32) {
+        self.tally.word(REBORN_WORD).fetch_or(boards, Ordering::SeqCst);
+        // what cannot be removed shows when the place is taken
+        let _ = Node::<ipc::Service>::list(self.node.config(), |state| {
+            if let NodeState::Dead(view) = state {
+                let _ = view.try_remove_stale_resources();
+            }
+            CallbackProgression::Continue
+        });
     }
 }
 

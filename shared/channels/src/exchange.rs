@@ -1,5 +1,6 @@
 //! The mail of one process: what its boards send goes to the boards beside them and to other processes.
 
+use crate::domain::{DOWN_WORD, REBORN_WORD};
 use crate::page::Page;
 use crate::{ChannelError, Domain, Port, Sender, wall_ns};
 use board::routes::{ROUTES, Route};
@@ -27,6 +28,8 @@ pub struct Exchange {
     /// the number is cheaper than one into an empty channel.
     tally: Option<Page>,
     seen: Vec<u32>,
+    /// Boards that are down, as the outlets know them.
+    down: u32,
     /// Messages taken in since they were last asked for, where transport is measured.
     hops: Option<Vec<Span>>,
 }
@@ -36,8 +39,8 @@ trait Outlet {
     fn send(&mut self, mail: &Mail, stamped: bool) -> Result<(), ChannelError>;
     /// Messages sent so far.
     fn sent(&self) -> u32;
-    /// The reader in that process is gone for good.
-    fn forget(&mut self, board: BoardId);
+    /// Messages need not reach these boards, a bit each, and only these.
+    fn expect_all_but(&mut self, down: u32);
 }
 
 trait Inlet {
@@ -66,12 +69,12 @@ macro_rules! payloads {
             fn newest(&self) -> u64 { self.$time }
         })*
 
-        fn open_outlet(kind: Kind, domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize) -> Result<Box<dyn Outlet>, ChannelError> {
-            Ok(match kind { $(Kind::$kind => Box::new(TypedOutlet::<$payload>::open(domain, name, readers, processes)?),)* })
+        fn open_outlet(kind: Kind, domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize, carried: u32) -> Result<Box<dyn Outlet>, ChannelError> {
+            Ok(match kind { $(Kind::$kind => Box::new(TypedOutlet::<$payload>::open(domain, name, readers, processes, carried)?),)* })
         }
 
-        fn open_inlet(kind: Kind, domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize) -> Result<Box<dyn Inlet>, ChannelError> {
-            Ok(match kind { $(Kind::$kind => Box::new(TypedInlet::<$payload>::open(domain, name, readers, processes)?),)* })
+        fn open_inlet(kind: Kind, domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize, carried: u32) -> Result<Box<dyn Inlet>, ChannelError> {
+            Ok(match kind { $(Kind::$kind => Box::new(TypedInlet::<$payload>::open(domain, name, readers, processes, carried)?),)* })
         }
 
         fn copy(kind: Kind, from: &Mail, to: &mut Mail) {
@@ -101,8 +104,15 @@ struct TypedOutlet<T: Payload> {
 }
 
 impl<T: Payload> TypedOutlet<T> {
-    fn open(domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize) -> Result<Self, ChannelError> {
-        Ok(TypedOutlet { sender: Sender::open(domain, name, processes, BUFFER, LENGTH)?, seq: 0, readers })
+    /// `carried`: messages that the channel has carried before.
+    fn open(
+        domain: &Domain,
+        name: &str,
+        readers: Vec<BoardId>,
+        processes: usize,
+        carried: u32,
+    ) -> Result<Self, ChannelError> {
+        Ok(TypedOutlet { sender: Sender::open(domain, name, processes, BUFFER, LENGTH)?, seq: carried, readers })
     }
 }
 
@@ -121,23 +131,30 @@ impl<T: Payload> Outlet for TypedOutlet<T> {
         self.seq
     }
 
-    fn forget(&mut self, board: BoardId) {
-        if let Some(i) = self.readers.iter().position(|reader| *reader == board) {
-            self.readers.remove(i);
-            self.sender.expect_readers(self.readers.len());
-        }
+    fn expect_all_but(&mut self, down: u32) {
+        let up = self.readers.iter().filter(|reader| down >> **reader as u32 & 1 == 0);
+        self.sender.expect_readers(up.count());
     }
 }
 
 struct TypedInlet<T: Payload> {
     port: Port<T, Header>,
-    expected: u32,
+    /// Number of the next message, where it is known.
+    expected: Option<u32>,
     readers: Vec<BoardId>,
 }
 
 impl<T: Payload> TypedInlet<T> {
-    fn open(domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize) -> Result<Self, ChannelError> {
-        Ok(TypedInlet { port: Port::open(domain, name, processes, BUFFER)?, expected: 0, readers })
+    /// `carried`: messages that the channel has carried before. The first one that is seen then counts as the one expected.
+    fn open(
+        domain: &Domain,
+        name: &str,
+        readers: Vec<BoardId>,
+        processes: usize,
+        carried: u32,
+    ) -> Result<Self, ChannelError> {
+        let expected = (carried == 0).then_some(0);
+        Ok(TypedInlet { port: Port::open(domain, name, processes, BUFFER)?, expected, readers })
     }
 }
 
@@ -156,10 +173,10 @@ impl<T: Payload> Inlet for TypedInlet<T> {
         let mut gap = None;
         let mut take = |header: &Header, payload: &mut dyn Iterator<Item = &T>| {
             arrived(header);
-            if header.seq != *expected {
-                gap = Some((*expected, header.seq));
+            if let Some(expected) = expected.filter(|expected| *expected != header.seq) {
+                gap = Some((expected, header.seq));
             }
-            *expected = header.seq.wrapping_add(1);
+            *expected = Some(header.seq.wrapping_add(1));
             let (first, others) = readers.split_at(1);
             let inbox = T::of_mut(&mut inboxes[first[0] as usize]);
             let start = inbox.len();
@@ -209,21 +226,23 @@ impl Exchange {
             processes.sort_unstable();
             processes.dedup();
             let name = format!("{}/{:?}", route.from.name(), route.kind).to_lowercase();
+            // not 0 in a process that is started again
+            let carried = domain.map_or(0, |domain| domain.tally.word(index).load(Ordering::SeqCst));
             if here.contains(&route.from) {
                 if let (Some(domain), false) = (domain, processes.is_empty()) {
                     // one reader board stands for each process
                     let mut ends = away.clone();
                     ends.dedup_by_key(|board| process_of(*board));
-                    exchange.outlets.push((index, open_outlet(route.kind, domain, &name, ends, processes.len())?));
+                    exchange.outlets.push((index, open_outlet(route.kind, domain, &name, ends, processes.len(), carried)?));
                 }
                 if !readers.is_empty() {
                     exchange.local.push((*route, readers));
                 }
             } else if let (Some(domain), false) = (domain, readers.is_empty()) {
-                exchange.inlets.push((index, open_inlet(route.kind, domain, &name, readers, processes.len())?));
+                exchange.inlets.push((index, open_inlet(route.kind, domain, &name, readers, processes.len(), carried)?));
+                exchange.seen.push(carried);
             }
         }
-        exchange.seen = vec![0; exchange.inlets.len()];
         Ok(exchange)
     }
 
@@ -232,6 +251,13 @@ impl Exchange {
         for (route, readers) in self.local.iter().filter(|(route, _)| route.from == from) {
             for reader in readers {
                 copy(route.kind, mail, &mut inboxes[*reader as usize]);
+            }
+        }
+        if let Some(tally) = &self.tally {
+            let down = tally.word(DOWN_WORD).load(Ordering::SeqCst);
+            if down != self.down {
+                self.down = down;
+                self.outlets.iter_mut().for_each(|(_, outlet)| outlet.expect_all_but(down));
             }
         }
         let stamped = self.hops.is_some();
@@ -254,10 +280,14 @@ impl Exchange {
         for ((route, inlet), seen) in inlets {
             let carried = tally.as_ref().map_or(0, |tally| tally.word(*route).load(Ordering::SeqCst));
             let news = carried.wrapping_sub(std::mem::replace(seen, carried));
-            if news == 0 {
+            let reborn = tally.as_ref().map_or(0, |tally| tally.word(REBORN_WORD).load(Ordering::SeqCst));
+            let reborn = reborn >> ROUTES[*route].from as u32 & 1 == 1;
+            if news == 0 && !reborn {
                 continue;
             }
-            inlet.receive(news, inboxes, &mut |header| {
+            // a sender that died may have sent one message that it has not counted
+            let most = if reborn { u32::MAX } else { news };
+            let received = inlet.receive(most, inboxes, &mut |header| {
                 if let Some(hops) = hops {
                     hops.push(Span {
                         t: header.t,
@@ -270,7 +300,11 @@ impl Exchange {
                         ..Span::new(SpanKind::Hop, to)
                     });
                 }
-            })?;
+            });
+            match received {
+                Err(ChannelError::Lost { .. }) if reborn => {}
+                received => received?,
+            }
         }
         Ok(())
     }
@@ -292,11 +326,6 @@ impl Exchange {
             channel: *route as u32,
             ..Span::new(SpanKind::Sent, ROUTES[*route].from)
         })
-    }
-
-    /// The process of `board` is gone for good: messages need not reach it any more.
-    pub fn forget(&mut self, board: BoardId) {
-        self.outlets.iter_mut().for_each(|(_, outlet)| outlet.forget(board));
     }
 }
 

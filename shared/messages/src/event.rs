@@ -53,6 +53,10 @@ pub enum EventKind {
     FaultInjected = 16,
     /// The detector [`Event::cause`] begins to fire; `a` = its figure (axis, joint, address, number).
     Detected = 17,
+    /// Board `a` (its number) died unplanned.
+    BoardLost = 18,
+    /// Board `a` (its number) has been powered up again.
+    BoardUp = 19,
 }
 
 impl EventKind {
@@ -76,6 +80,8 @@ impl EventKind {
             EventKind::OverrunTrip => "overrun-trip",
             EventKind::FaultInjected => "fault-injected",
             EventKind::Detected => "detected",
+            EventKind::BoardLost => "board-lost",
+            EventKind::BoardUp => "board-up",
         }
     }
 
@@ -100,6 +106,8 @@ impl EventKind {
             OverrunTrip,
             FaultInjected,
             Detected,
+            BoardLost,
+            BoardUp,
         ]
         .into_iter()
         .find(|kind| *kind as u32 == number)

@@ -80,7 +80,7 @@ fn count(factory: pacing::Factory<'_>) -> Result<f64, Box<dyn std::error::Error>
     let mut scenario = scenario::load("table-5-3", &settings)?.scenario()?;
     scenario.processes.retain(|process| process.name != "chassis");
     let this = std::env::current_exe()?.to_string_lossy().into_owned();
-    let context = Context { prefix: String::new(), variant: String::new(), record: None, measure: false, scenario };
+    let context = Context { prefix: String::new(), variant: String::new(), record: None, measure: false, in_process: false, scenario };
     let mut rack = Lockstep::power_up(context, factory, &|_| vec![this.clone()], &INTERRUPTED)?;
     let begun = Instant::now();
     let mut watch = Watch { windows: 0, end: begun + Duration::from_secs_f64(seconds) };

@@ -5,12 +5,14 @@
 use crate::affinity::OneProcessor;
 use crate::error::at;
 use crate::host::{Answer, Factory, Host};
+use crate::life::Life;
 use crate::remote::{READY, Remote};
 use crate::serve::{CHASSIS_BELL, process_of};
 use crate::{Context, Observer, Power, RunError, RunFolder};
 use board::{BoardId, Ns, Op};
 use channels::{Bell, Bells, Domain, Exchange};
 use messages::{BOARDS, Grant, NOBODY, Span, TransferRecord, flags};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use vme::{Log, Origin, Timing, Transfer};
@@ -29,13 +31,25 @@ const SPIN_S: u64 = 5;
 const READY_LIMIT: Duration = Duration::from_secs(30);
 
 /// All boards but the chassis' own.
-pub(crate) struct Boards {
+pub(crate) struct Boards<'f> {
     pub host: Host,
     pub remotes: Vec<Remote>,
     /// Index in `remotes` of each board's process; `None` = here.
     pub place: [Option<usize>; BOARDS.len()],
     pub power: Power,
     pub bells: Option<(Bells, Bell)>,
+    /// What is down, and when it changes.
+    pub life: Life,
+    /// What the processes were told; a recorder that is started again is told another file.
+    pub context: Context,
+    /// The file of the first recorder.
+    pub first_record: Option<PathBuf>,
+    /// Files of the record so far.
+    pub parts: u32,
+    pub factory: Factory<'f>,
+    /// Program and arguments of each of `remotes`.
+    pub commands: Vec<Vec<String>>,
+    pub domain: Option<Domain>,
     /// Boards of the rack's tasks and slaves.
     pub of_task: Vec<BoardId>,
     of_slave: Vec<BoardId>,
@@ -67,25 +81,25 @@ pub(crate) struct Boards {
     pub folder: Option<RunFolder>,
 }
 
-impl Boards {
+impl<'f> Boards<'f> {
     /// Starts the processes of the scenario (none if all its boards are in the chassis), waits until each is ready, and
     /// lets every board show its initial state. `programs` finds the built-in program of a process.
     pub fn power_up(
         mut context: Context,
-        factory: Factory<'_>,
+        factory: Factory<'f>,
         programs: &dyn Fn(&scenario::Process) -> Vec<String>,
         interrupted: &'static AtomicBool,
-    ) -> Result<(Boards, Timing), RunError> {
+    ) -> Result<(Boards<'f>, Timing), RunError> {
         let scenario = context.scenario.clone();
         let (fault_plan, faults) = scenario.fault_plan();
         let mut timing = Timing::with_faults(scenario.rack.clone(), fault_plan)?;
-        let place = BOARDS.map(|board| process_of(&scenario, board));
+        let place = BOARDS.map(|board| if context.in_process { 0 } else { process_of(&scenario, board) });
         let away: Vec<usize> = (0..scenario.processes.len()).filter(|i| place.contains(&(i + 1))).collect();
         let here: Vec<BoardId> = BOARDS.into_iter().filter(|board| place[*board as usize] == 0).collect();
         // removed last, where the start fails
         let mut folder = None;
         let mut power = Power::default();
-        let mut remotes = Vec::new();
+        let (mut remotes, mut commands) = (Vec::new(), Vec::new());
         let (mut domain, mut bells) = (None, None);
         if !away.is_empty() {
             let run_folder = RunFolder::create()?;
@@ -109,7 +123,9 @@ impl Boards {
         if let Some(folder) = &folder {
             for i in &away {
                 let process = &scenario.processes[*i];
-                let pid = power.spawn(&process.name, &programs(process), &folder.path)?;
+                let command = programs(process);
+                let pid = power.spawn(&process.name, &command, &folder.path)?;
+                commands.push(command);
                 let records = process.boards.iter().any(|board| board == BoardId::BusAnalyzer.name());
                 if let Some(processor) = processor.as_ref().filter(|_| records) {
                     processor.release(pid);
@@ -125,6 +141,13 @@ impl Boards {
             place: place.map(|process| away.iter().position(|i| i + 1 == process)),
             power,
             bells,
+            life: Life::new(&scenario),
+            first_record: context.record.clone(),
+            parts: 1,
+            context,
+            factory,
+            commands,
+            domain,
             of_task: scenario.rack.tasks.iter().map(|task| board_named(&task.board)).collect(),
             of_slave: scenario.rack.slaves.iter().map(|slave| board_named(&slave.board)).collect(),
             transfers: Default::default(),
@@ -143,7 +166,9 @@ impl Boards {
             processor_kept: processor,
             folder,
         };
-        boards.wait_until_ready()?;
+        for remote in 0..boards.remotes.len() {
+            boards.wait_until_ready(remote)?;
+        }
         for board in &BOARDS[1..] {
             let answer = boards.ask(&boards.grant_of(*board, 0, 0, flags::BOOT))?;
             for (task, program) in answer.programs {
@@ -174,33 +199,35 @@ impl Boards {
         self.longest.iter().map(|job| job.concat()).collect()
     }
 
-    fn wait_until_ready(&mut self) -> Result<(), RunError> {
-        let start = Instant::now();
-        for i in 0..self.remotes.len() {
-            loop {
-                match self.remotes[i].reply(0)? {
-                    Some((_, READY, _)) => break,
-                    Some(_) => {
-                        return Err(RunError::BadAnswer {
-                            board: "unknown",
-                            what: format!("process `{}` answered before it was asked", self.remotes[i].process),
-                            when: at(0),
-                        });
-                    }
-                    None => {}
-                }
-                self.listen()?;
-                if start.elapsed() > READY_LIMIT {
-                    return Err(RunError::Stalled {
-                        process: self.remotes[i].process.clone(),
-                        how: "it did not report ready".into(),
-                        waited_s: start.elapsed().as_secs_f64(),
-                        when: at(0),
+    /// Waits until a process that has been started says that it is ready.
+    pub fn wait_until_ready(&mut self, remote: usize) -> Result<(), RunError> {
+        let (start, when) = (Instant::now(), at(self.reached));
+        loop {
+            match self.remotes[remote].reply(self.reached)? {
+                Some((_, READY, _)) => return Ok(()),
+                Some(_) => {
+                    return Err(RunError::BadAnswer {
+                        board: "unknown",
+                        what: format!("process `{}` answered before it was asked", self.remotes[remote].process),
+                        when,
                     });
                 }
+                None => {}
+            }
+            self.listen()?;
+            let process = &self.remotes[remote].process;
+            if let Some(how) = self.life.died(process) {
+                return Err(RunError::Died { process: process.clone(), how: how.to_owned(), when });
+            }
+            if start.elapsed() > READY_LIMIT {
+                return Err(RunError::Stalled {
+                    process: self.remotes[remote].process.clone(),
+                    how: "it did not report ready".into(),
+                    waited_s: start.elapsed().as_secs_f64(),
+                    when,
+                });
             }
         }
-        Ok(())
     }
 
     /// Waits a little for the chassis' bell.
@@ -218,8 +245,10 @@ impl Boards {
             return Err(RunError::Interrupted { when: at(self.reached) });
         }
         match self.power.ended() {
-            Some((process, how)) => Err(RunError::Died { process, how, when: at(self.reached) }),
-            None => Ok(()),
+            Some((process, how)) if !self.outlives(&process, &how) => {
+                Err(RunError::Died { process, how, when: at(self.reached) })
+            }
+            _ => Ok(()),
         }
     }
 
@@ -333,6 +362,9 @@ impl Boards {
             self.host.step(grant, &[])?;
             return Ok(());
         };
+        if self.life.is_down(BoardId::BusAnalyzer) {
+            return Ok(());
+        }
         self.recorder_owes += 1;
         self.recorder_sleeps += 1;
         let wake = self.recorder_sleeps >= self.recorder_batch;
@@ -345,10 +377,29 @@ impl Boards {
             self.recorder_owes -= 1;
         }
         while self.recorder_owes >= RECORDER_CREDIT {
-            self.await_reply(remote)?;
+            if self.await_reply_or(remote, &|_| false)?.is_none() {
+                break;
+            }
             self.recorder_owes -= 1;
         }
         Ok(())
+    }
+
+    /// Waits until the recorder has acted on all that it was granted.
+    pub fn settle_recorder(&mut self) -> Result<(), RunError> {
+        self.wake_recorder();
+        while let (Some(remote), true) = (self.place[BoardId::BusAnalyzer as usize], self.recorder_owes > 0) {
+            if self.await_reply_or(remote, &|_| false)?.is_none() {
+                break;
+            }
+            self.recorder_owes -= 1;
+        }
+        Ok(())
+    }
+
+    /// The recorder is down: it owes nothing any more.
+    pub fn forget_recorder(&mut self) {
+        (self.recorder_owes, self.recorder_sleeps) = (0, 0);
     }
 
     /// Gives the recorder the turns for the grants that it has.
@@ -380,6 +431,9 @@ impl Boards {
         if sent.is_err() {
             // a process that has just died is the better explanation
             self.watch()?;
+            if self.life.is_down(BOARDS[grant.board as usize]) {
+                return Ok(());
+            }
         }
         Ok(sent?)
     }
@@ -415,7 +469,8 @@ impl Boards {
         }
     }
 
-    /// The next answer of a process; none once `is_silent` says that it has nothing to say.
+    /// The next answer of a process; none once `is_silent` says that it has nothing to say, or it has died and the run goes
+    /// on without it.
     fn await_reply_or(
         &mut self,
         remote: usize,
@@ -435,6 +490,9 @@ impl Boards {
                 continue;
             }
             self.watch()?;
+            if BOARDS.iter().any(|board| self.place[*board as usize] == Some(remote) && self.life.is_down(*board)) {
+                return Ok(None);
+            }
             let name = &self.remotes[remote].process;
             let used = self.power.used(name);
             let (asked, used_at_first) = *first.get_or_insert((Instant::now(), used));
@@ -451,8 +509,12 @@ impl Boards {
                 waiting = None;
                 continue;
             };
+            let name = name.clone();
+            if self.outlives(&name, &format!("was stalled ({how})")) {
+                return Ok(None);
+            }
             return Err(RunError::Stalled {
-                process: name.clone(),
+                process: name,
                 how,
                 waited_s: asked.elapsed().as_secs_f64(),
                 when: at(self.reached),

@@ -46,6 +46,18 @@ pub enum RunError {
         /// What is wrong.
         reason: String,
     },
+    /// A process did not do what a signal makes it do.
+    #[error("process `{process}` after {signal}: {reason}, {when}")]
+    Signal {
+        /// Its name.
+        process: String,
+        /// The signal.
+        signal: &'static str,
+        /// What the operating system says.
+        reason: String,
+        /// Simulated time, in words.
+        when: String,
+    },
     /// A process could not be started.
     #[error("cannot start process `{process}` ({program}): {reason}")]
     Spawn {

@@ -60,6 +60,23 @@ impl Host {
         Ok(Host { boards, exchange, inboxes: Box::default(), inputs, outputs, measured: None })
     }
 
+    /// Drops these boards as a killed process drops them: nothing is flushed, nothing said.
+    pub(crate) fn drop_boards(&mut self, down: &[BoardId]) {
+        let (gone, kept) = std::mem::take(&mut self.boards).into_iter().partition(|(id, _)| down.contains(id));
+        self.boards = kept;
+        std::mem::forget::<Vec<_>>(gone);
+    }
+
+    /// Builds boards that were dropped anew; mail that has come for them is lost.
+    pub(crate) fn build(&mut self, up: &[BoardId], context: &Context, factory: Factory<'_>) -> Result<(), RunError> {
+        for id in up {
+            let board = factory(*id, context).map_err(|reason| RunError::Board { board: id.name(), reason })?;
+            self.inboxes[*id as usize].clear();
+            self.boards.push((*id, board));
+        }
+        Ok(())
+    }
+
     /// Takes in the mail of the board that the grant names and steps it.
     pub fn step(&mut self, grant: &Grant, transfers: &[TransferRecord]) -> Result<Answer, RunError> {
         if let Some(id) = BoardId::from_number(grant.board as u8) {

@@ -5,6 +5,7 @@
 //! * [`Realtime`] runs the same windows by the wall clock, peer to peer.
 //! * [`Host`] steps the boards of one process; [`serve`] is the whole `main` of a board's process.
 //! * [`RunFolder`] and [`Power`]: what a run leaves on the machine, and how it goes away again.
+//! * `life` and `lines`: boards that go down and come up again, and what the drives see of it.
 //!
 //! A peer that dies or stalls is a [`RunError`] within a bounded wall time; a wall-clock limit may only abort a run, never
 //! change a simulated value.
@@ -17,6 +18,8 @@ mod boards;
 mod error;
 mod holdback;
 mod host;
+mod life;
+mod lines;
 mod lockstep;
 mod power;
 mod realtime;
@@ -29,5 +32,5 @@ pub use host::{Answer, Factory, Host};
 pub use lockstep::{Flow, Lockstep, Observer};
 pub use power::Power;
 pub use realtime::{Realtime, ask_for_rights};
-pub use run_folder::{Context, RunFolder, clean_stale, live_runs, stale_runs};
+pub use run_folder::{Context, RunFolder, clean_stale, live_runs, part_of, stale_runs};
 pub use serve::serve;

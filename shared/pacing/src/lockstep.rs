@@ -44,10 +44,10 @@ pub trait Observer {
 }
 
 /// A rack in lock step.
-pub struct Lockstep {
+pub struct Lockstep<'f> {
     timing: Timing,
     ahead: Timing,
-    boards: Boards,
+    boards: Boards<'f>,
     /// Rest of the jobs of each task, as its board last said.
     rest: Vec<Vec<Op>>,
     log: Log,
@@ -56,16 +56,17 @@ pub struct Lockstep {
     own_mail: Mail,
 }
 
-impl Lockstep {
+impl<'f> Lockstep<'f> {
     /// Powers the rack up: starts the processes of the scenario (none if all its boards are in the chassis) and waits until
     /// each is ready. `programs` finds the built-in program of a process.
     pub fn power_up(
         context: Context,
-        factory: Factory<'_>,
+        factory: Factory<'f>,
         programs: &dyn Fn(&scenario::Process) -> Vec<String>,
         interrupted: &'static AtomicBool,
-    ) -> Result<Lockstep, RunError> {
-        let (boards, timing) = Boards::power_up(context, factory, programs, interrupted)?;
+    ) -> Result<Lockstep<'f>, RunError> {
+        let (mut boards, timing) = Boards::power_up(context, factory, programs, interrupted)?;
+        boards.life.allow_restarts();
         Ok(Lockstep {
             ahead: timing.clone(),
             rest: vec![Vec::new(); timing.rack().tasks.len()],
@@ -85,6 +86,11 @@ impl Lockstep {
     /// Folder of the run, where it has one.
     pub fn folder(&self) -> Option<&Path> {
         self.boards.folder.as_ref().map(|folder| folder.path.as_path())
+    }
+
+    /// What was lost on the way although the run went on, in words.
+    pub fn losses(&self) -> &[String] {
+        &self.boards.life.losses
     }
 
     /// Simulated time reached.
@@ -108,9 +114,13 @@ impl Lockstep {
             if self.boards.window.is_multiple_of(1024) {
                 self.boards.watch()?;
             }
+            self.boards.change_lives(self.timing.now(), &mut self.timing, &mut self.rest)?;
             let flow = self.step(end, observer)?;
             let until = self.timing.now();
             let mail = self.boards.host.read()?;
+            if let Some(probe) = mail.plant_probe.last() {
+                self.boards.life.lines.probe(probe);
+            }
             let flow = match observer.window(until, mail, &self.log) {
                 Flow::Stop => Flow::Stop,
                 Flow::Continue => flow,
@@ -128,7 +138,7 @@ impl Lockstep {
     pub fn finish(mut self) -> Result<(), RunError> {
         let now = self.timing.now();
         self.boards.wake_recorder();
-        for board in &BOARDS[1..] {
+        for board in BOARDS[1..].iter().filter(|board| !self.boards.life.is_down(**board)).collect::<Vec<_>>() {
             let grant = self.boards.grant_of(*board, now, now, flags::FINISH);
             self.boards.ask(&grant)?;
         }
@@ -139,7 +149,13 @@ impl Lockstep {
     /// One window.
     fn step(&mut self, end: Ns, observer: &mut dyn Observer) -> Result<Flow, RunError> {
         let from = self.timing.now();
-        let limit = end.min(from + MAX_WINDOW);
+        let limit = end.min(from + MAX_WINDOW).min(self.boards.life.next_change());
+        // what has to be there when the boards act
+        self.own_mail.clear();
+        self.own_mail.amplifier.append(&mut self.boards.life.mail.amplifier);
+        if !self.own_mail.amplifier.is_empty() {
+            self.boards.host.send(&self.own_mail)?;
+        }
         let mut stop = self.look_ahead(limit);
         let mut until = self.ahead.now();
 
@@ -158,13 +174,17 @@ impl Lockstep {
             stop = self.look_ahead(early);
             until = early;
             self.plan_turns(&WIRES_AGAIN, from, until, stop);
-            self.turns[0].flags |= flags::RERUN;
+            let da_io = self.turns.iter_mut().filter(|turn| turn.board == BoardId::DaIo as u32);
+            da_io.for_each(|turn| turn.flags |= flags::RERUN);
             self.boards.take_turns(&self.turns)?;
         }
         for i in 0..self.turns.len() {
             self.answered(i)?;
         }
         self.own_mail.clear();
+        self.own_mail.events.append(&mut self.boards.life.mail.events);
+        let written = &self.boards.transfers[BoardId::DaIo as usize];
+        self.boards.life.lines.transfers(written);
         match stop {
             Stop::Overrun { task, job } => {
                 self.ahead.halt(task);
@@ -189,7 +209,13 @@ impl Lockstep {
     fn look_ahead(&mut self, limit: Ns) -> Stop {
         self.ahead.clone_from(&self.timing);
         self.log.clear();
-        let stop = self.ahead.advance(limit, &mut self.log);
+        let mut stop = self.ahead.advance(limit, &mut self.log);
+        // boards that are down have been told of, and this window began there
+        while let Stop::Fault { fault } = stop
+            && usize::from(fault) >= self.boards.faults.len()
+        {
+            stop = self.ahead.advance(limit, &mut self.log);
+        }
         self.boards.sort_transfers(&self.log);
         stop
     }
@@ -205,8 +231,9 @@ impl Lockstep {
     /// Who has a turn in a window: the boards on the wires, then the masters that decide or were written to.
     fn plan_turns(&mut self, wires: &[BoardId], from: Ns, until: Ns, stop: Stop) {
         self.turns.clear();
-        self.turns.extend(wires.iter().map(|board| self.boards.grant_of(*board, from, until, 0)));
-        for board in [BoardId::ControlComputer, BoardId::Workstation] {
+        let up = |board: &&BoardId| !self.boards.life.is_down(**board);
+        self.turns.extend(wires.iter().filter(up).map(|board| self.boards.grant_of(*board, from, until, 0)));
+        for board in [BoardId::ControlComputer, BoardId::Workstation].iter().filter(up).copied() {
             let mut grant = self.boards.grant_of(board, from, until, 0);
             if let Stop::Decision { task, job } = stop
                 && self.boards.of_task[usize::from(task)] == board

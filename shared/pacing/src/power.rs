@@ -18,6 +18,8 @@ const LEAVE: Duration = Duration::from_secs(2);
 #[derive(Default)]
 pub struct Power {
     children: Vec<(String, Child)>,
+    /// Processes that hang as planned.
+    hanging: Vec<String>,
 }
 
 impl Power {
@@ -50,6 +52,40 @@ impl Power {
     /// Process numbers, in the order of starting.
     pub fn pids(&self) -> impl Iterator<Item = (&str, u32)> {
         self.children.iter().map(|(name, child)| (name.as_str(), child.id()))
+    }
+
+    /// Kills (or, to make it hang, stops) a process, and confirms that it has ended (or is in state T). The message says
+    /// what the operating system refused or showed.
+    pub fn take_down(&mut self, name: &str, hang: bool) -> Result<(), String> {
+        if !hang {
+            return if self.remove(name) { Ok(()) } else { Err("it had ended before".into()) };
+        }
+        let pid = self.pid(name).ok_or("it had ended before")?;
+        kill_process(pid, Signal::STOP).map_err(|error| error.to_string())?;
+        let deadline = Instant::now() + LEAVE;
+        while !matches!(self.activity(name), Some(('T', _))) {
+            if Instant::now() > deadline {
+                return Err("it goes on".into());
+            }
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        self.hanging.push(name.to_owned());
+        Ok(())
+    }
+
+    /// Ends a process with SIGKILL, if it has not ended, and forgets it. False where there was none that lived.
+    pub fn remove(&mut self, name: &str) -> bool {
+        let Some(i) = self.children.iter().position(|(known, _)| known == name) else { return false };
+        let (_, mut child) = self.children.remove(i);
+        self.hanging.retain(|known| known != name);
+        let lived = matches!(child.try_wait(), Ok(None));
+        kill(&mut child);
+        lived
+    }
+
+    fn pid(&self, name: &str) -> Option<Pid> {
+        let (_, child) = self.children.iter().find(|(known, _)| known == name)?;
+        Pid::from_raw(child.id() as i32)
     }
 
     /// A process that has ended, killed ones first, since others may have followed them.
@@ -91,8 +127,11 @@ impl Power {
 
     /// Ends all processes: lifelines first, SIGKILL for those that do not leave. Returns the names of the killed.
     pub fn shut_down(&mut self) -> Vec<String> {
-        for (_, child) in &mut self.children {
+        for (name, child) in &mut self.children {
             drop(child.stdin.take());
+            if self.hanging.contains(name) {
+                kill(child);
+            }
         }
         let deadline = Instant::now() + LEAVE;
         let mut killed = Vec::new();
@@ -102,11 +141,7 @@ impl Power {
                     Ok(Some(_)) | Err(_) => break,
                     Ok(None) if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(2)),
                     Ok(None) => {
-                        if let Some(pid) = Pid::from_raw(child.id() as i32) {
-                            // it may have left in this very moment
-                            let _ = kill_process(pid, Signal::KILL);
-                        }
-                        let _ = child.wait();
+                        kill(child);
                         killed.push(name.clone());
                         break;
                     }
@@ -122,6 +157,12 @@ impl Drop for Power {
     fn drop(&mut self) {
         self.shut_down();
     }
+}
+
+/// Kills and reaps it; it may have ended in this very moment.
+fn kill(child: &mut Child) {
+    let _ = child.kill();
+    let _ = child.wait();
 }
 
 fn describe(status: ExitStatus) -> String {

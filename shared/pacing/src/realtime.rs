@@ -47,8 +47,8 @@ struct Debt {
 }
 
 /// A rack in real time.
-pub struct Realtime {
-    boards: Boards,
+pub struct Realtime<'f> {
+    boards: Boards<'f>,
     plan: Plan,
     local: Paced,
     zero: u64,
@@ -60,14 +60,14 @@ pub struct Realtime {
     own_mail: Mail,
 }
 
-impl Realtime {
+impl<'f> Realtime<'f> {
     /// Powers the rack up, as [`crate::Lockstep::power_up`] does.
     pub fn power_up(
         context: Context,
-        factory: Factory<'_>,
+        factory: Factory<'f>,
         programs: &dyn Fn(&scenario::Process) -> Vec<String>,
         interrupted: &'static AtomicBool,
-    ) -> Result<Realtime, RunError> {
+    ) -> Result<Realtime<'f>, RunError> {
         let scenario = context.scenario.clone();
         let (mut boards, timing) = Boards::power_up(context, factory, programs, interrupted)?;
         if let Some(processor) = boards.processor_kept.take() {

@@ -24,8 +24,20 @@ pub struct Context {
     /// What the boards do is measured.
     #[serde(default)]
     pub measure: bool,
+    /// Every board is in the chassis, wherever the scenario places it.
+    #[serde(default)]
+    pub in_process: bool,
     /// The scenario with the variant's overrides.
     pub scenario: Scenario,
+}
+
+/// The record's file from its `number`-th beginning on (1 = the first): a recorder that is started again does not touch
+/// what is there.
+pub fn part_of(record: &Path, number: u32) -> PathBuf {
+    match number {
+        0 | 1 => record.to_path_buf(),
+        _ => record.with_extension(format!("part{number}.mcap")),
+    }
 }
 
 impl Context {

@@ -47,7 +47,7 @@ fn every_board_gets_every_window_once_and_in_order_and_every_job_is_decided_once
     let boards = messages::BOARDS[1..].iter().map(|board| board.name().to_owned()).collect();
     let chassis = scenario::Process { name: "chassis".into(), boards, ..Default::default() };
     let scenario = scenario::Scenario { processes: vec![chassis], ..scenario };
-    let context = Context { prefix: String::new(), variant: String::new(), record: None, measure: true, scenario };
+    let context = Context { prefix: String::new(), variant: String::new(), record: None, measure: true, in_process: false, scenario };
     let (heard, hear) = channel();
     let factory = |role, _: &Context| Ok(Box::new(Listener { role, heard: heard.clone() }) as Box<dyn Board>);
     let mut rack = Realtime::power_up(context, &factory, &|_| Vec::new(), &INTERRUPTED).expect("power up");

@@ -36,6 +36,7 @@ pub(crate) fn check(scenario: &Scenario) -> Result {
         within(&format!("safety.{key}"), value, 0.0..=most, &format!("0 to {most}"))?;
     }
     processes(scenario)?;
+    crate::outages::check(scenario)?;
     realtime(scenario)?;
     variants_and_limits(scenario)?;
     reach(scenario)?;

@@ -77,7 +77,7 @@ impl Scenario {
         self.faults.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The faults of bus and processors; [`Occurrence`]s beside them in the same order.
+    /// The faults of bus and processors, [`Occurrence`]s beside them in the same order; then those of boards that are down.
     pub fn fault_plan(&self) -> (vme::FaultPlan, Vec<Occurrence>) {
         let (mut plan, mut known) = (vme::FaultPlan::default(), Vec::new());
         for occurrence in self.occurrences() {
@@ -88,6 +88,7 @@ impl Scenario {
                 known.push(occurrence);
             }
         }
+        plan.faults.extend(self.outage_faults());
         (plan, known)
     }
 

@@ -114,7 +114,7 @@ pub struct Variant {
 }
 
 /// One operating-system process.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Process {
     /// Name in the process list.
@@ -130,6 +130,43 @@ pub struct Process {
     /// Processors that it may run on in real time; default: all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cpus: Vec<usize>,
+    /// Simulated time from power-up to work, after a crash or hang (ms).
+    #[serde(default = "boot_ms")]
+    pub boot_ms: f64,
+    /// How often it is started again where it dies or stalls unplanned; default: once for a process of workstation and
+    /// bus_analyzer alone, never (the run ends) for any other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub restart: Option<Restart>,
+}
+
+impl Default for Process {
+    fn default() -> Self {
+        Process {
+            name: String::new(),
+            boards: Vec::new(),
+            command: Vec::new(),
+            priority: None,
+            cpus: Vec::new(),
+            boot_ms: boot_ms(),
+            restart: None,
+        }
+    }
+}
+
+fn boot_ms() -> f64 {
+    500.0
+}
+
+/// How often a process that dies unplanned is started again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Restart {
+    /// Not at all.
+    Never,
+    /// The first time only.
+    Once,
+    /// Every time.
+    Always,
 }
 
 /// Wall-clock pacing (`--pacing realtime`).

@@ -9,7 +9,8 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use report::{RunReport, Sweep, SweepPoint, Verdict};
-use scenario::{Document, Scenario, Variant};
+use messages::BoardId;
+use scenario::{Document, Restart, Scenario, ScenarioError, Variant};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -43,6 +44,9 @@ pub struct RunArgs {
     /// Override a key of the scenario; may be repeated.
     #[arg(long, value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
+    /// How often a process that dies unplanned is started again (never, once, always); may be repeated.
+    #[arg(long, value_name = "PROCESS=POLICY")]
+    restart: Vec<String>,
     /// Write no record.
     #[arg(long)]
     no_record: bool,
@@ -58,7 +62,13 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
     overrides.extend(args.strict.then(|| "realtime.strict=true".to_owned()));
     overrides.extend(args.duration.map(|seconds| format!("duration_s={seconds:?}")));
     let document = scenario::load(&args.scenario, &overrides)?;
-    let variants = chosen(&document, &args.variant)?;
+    let mut variants = chosen(&document, &args.variant)?;
+    for (_, scenario) in &mut variants {
+        args.restart.iter().try_for_each(|policy| set_restart(scenario, policy))?;
+        if args.pacing == Pacing::Realtime && !scenario.outages().is_empty() {
+            return Err(refused("--pacing", "realtime", "crashes and hangs are planned, expected lock step").into());
+        }
+    }
     let folder = out_folder(args.out.as_deref(), &document.name)?;
     end_on_signals()?;
     for (variant, scenario) in &variants {
@@ -71,6 +81,10 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
     let (mut failed, mut losses) = (false, false);
     for (variant, scenario) in &variants {
         let record = (!args.no_record).then(|| folder.join(format!("{}.mcap", variant.name)));
+        if let Some(record) = &record {
+            // of a run before in the same folder
+            parts(record).skip(1).try_for_each(std::fs::remove_file).into_diagnostic()?;
+        }
         let setting = Setting { pacing: args.pacing, in_process: args.in_process, record: record.clone(), measure: false };
         let finished = run_with_progress(scenario, variant, &setting)?;
         let mut result = finished.result;
@@ -78,14 +92,23 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
             eprintln!("error: variant {}: {error}", variant.name);
             failed = true;
         }
-        losses |= finished.record_lost;
+        for loss in &finished.losses {
+            eprintln!("warning: variant {}: {loss}", variant.name);
+        }
+        losses |= finished.record_lost || !finished.losses.is_empty();
         // a run that ends before it begins has none
         if let Some(record) = record.as_ref().filter(|record| !failed || record.exists()) {
-            match settle_record(record, finished.error.is_some()) {
-                Ok(digest) => result.digest = Some(digest),
-                Err(reason) => {
-                    eprintln!("error: {}: {reason}", record.display());
-                    losses = true;
+            let is_recorder_down = |outage: &scenario::Outage| outage.boards.contains(&BoardId::BusAnalyzer);
+            let broken =
+                failed || !finished.losses.is_empty() || scenario.outages().iter().any(is_recorder_down);
+            for (part, file) in parts(record).enumerate() {
+                match settle_record(&file, broken) {
+                    Ok(digest) if part == 0 => result.digest = Some(digest),
+                    Ok(_) => eprintln!("the record goes on in {}", file.display()),
+                    Err(reason) => {
+                        eprintln!("error: {}: {reason}", file.display());
+                        losses = true;
+                    }
                 }
             }
             result.record = record.file_name().map(|name| name.to_string_lossy().into_owned());
@@ -182,6 +205,41 @@ fn run_with_progress(scenario: &Scenario, variant: &Variant, setting: &Setting) 
     });
     bar.finish_and_clear();
     finished.map_err(|reason| miette!("variant {}: {reason}", variant.name))
+}
+
+/// The files of a record: one, and another for each time that the recorder was started again.
+fn parts(record: &Path) -> impl Iterator<Item = PathBuf> {
+    let first = record.to_path_buf();
+    let more = (2..).map({
+        let record = record.to_path_buf();
+        move |number| pacing::part_of(&record, number)
+    });
+    std::iter::once(first).chain(more.take_while(|file| file.exists()))
+}
+
+/// Sets the policy of `PROCESS=POLICY`.
+fn set_restart(scenario: &mut Scenario, text: &str) -> Result<(), ScenarioError> {
+    let (name, policy) = text.split_once('=').unwrap_or((text, ""));
+    let policy = match policy {
+        "never" => Restart::Never,
+        "once" => Restart::Once,
+        "always" => Restart::Always,
+        _ => return Err(refused("--restart", text, "expected PROCESS=never, PROCESS=once or PROCESS=always")),
+    };
+    let names: Vec<&str> = scenario.processes.iter().map(|process| process.name.as_str()).collect();
+    let unknown = format!("there is no process `{name}`, expected one of {}", names.join(", "));
+    let Some(process) = scenario.processes.iter_mut().find(|process| process.name == name) else {
+        return Err(refused("--restart", text, &unknown));
+    };
+    if policy != Restart::Never && !process.is_dispensable() {
+        return Err(refused("--restart", text, "the run ends with a process of any board but workstation and bus_analyzer"));
+    }
+    process.restart = Some(policy);
+    Ok(())
+}
+
+fn refused(origin: &str, key: &str, message: &str) -> ScenarioError {
+    ScenarioError::Override { origin: origin.into(), key: key.into(), message: message.into() }
 }
 
 /// The record's digest; a record that a broken run left cut is made whole first.

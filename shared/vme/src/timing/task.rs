@@ -264,10 +264,11 @@ impl Timing {
     }
 
     /// A halted task takes up its releases again, from rest.
-    fn restart(&mut self, t: u16) {
+    pub fn restart(&mut self, t: u16) {
         let task = &mut self.tasks[t as usize];
         task.state = rest_state(&self.wiring.rack.tasks[t as usize].release);
         task.backlog.clear();
         task.remaining = 0;
+        self.reschedule(self.wiring.processor_of_task[t as usize]);
     }
 }

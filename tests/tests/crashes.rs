@@ -126,6 +126,22 @@ fn workstation_and_recorder_are_started_again_and_the_run_ends_with_losses() {
 }
 
 #[test]
+fn in_real_time_the_run_goes_on_without_workstation_or_recorder_and_ends_with_losses() {
+    for name in DISPENSABLE {
+        let bench = Bench::new();
+        let scenario = bench.scenario("short.toml", &[]);
+        let mut run = bench.start(&["run", scenario, "--duration", "2", "--pacing", "realtime", "--out", "out"]);
+        let processes = run.wait_for_processes(7);
+        let victim = processes.iter().find(|process| process.name == name).expect("process").pid;
+        run.pause(Duration::from_millis(700));
+        signal(victim, Signal::KILL);
+        let outcome = run.wait().expect_code(3).expect_nothing_left();
+        outcome.expect_message(&format!("process `{name}`")).expect_message("the run went on without it");
+        recorded_s(&bench);
+    }
+}
+
+#[test]
 fn a_recorder_that_is_not_to_be_started_again_ends_the_run() {
     let bench = Bench::new();
     let scenario = bench.scenario("long.toml", &[]);
@@ -154,6 +170,43 @@ fn every_process_killed_and_stopped_at_many_moments() {
             }
         }
     }
+}
+
+/// A file system of so many KiB, unmounted at its end; none where the system refuses.
+struct Small(std::path::PathBuf);
+
+impl Small {
+    fn mount(at: std::path::PathBuf, kib: u32) -> Option<Small> {
+        std::fs::create_dir(&at).expect("mount point");
+        let size = format!("size={kib}k");
+        let mut mount = std::process::Command::new("mount");
+        let mounted = mount.args(["-t", "tmpfs", "-o", &size, "none"]).arg(&at).status();
+        mounted.is_ok_and(|status| status.success()).then(|| Small(at))
+    }
+}
+
+impl Drop for Small {
+    fn drop(&mut self) {
+        // whatever is left goes with the container
+        let _ = std::process::Command::new("umount").arg(&self.0).status();
+    }
+}
+
+#[test]
+fn a_full_disk_stops_the_record_and_not_the_control() {
+    let bench = Bench::new();
+    let Some(small) = Small::mount(bench.path("small"), 300) else {
+        println!("no small file system: not allowed to mount one");
+        return;
+    };
+    let scenario = bench.scenario("short.toml", &[]);
+    std::fs::create_dir(bench.path("out")).expect("folder");
+    std::os::unix::fs::symlink(small.0.join("nominal.mcap"), bench.path(RECORD)).expect("link");
+    let outcome = bench.run(&["run", scenario, "--duration", "4", "--json", "--out", "out"]).expect_code(3);
+    let outcome = outcome.expect_message("the record ends at").expect_message("No space left on device");
+    let report: serde_json::Value = serde_json::from_str(&outcome.expect_nothing_left().stdout).expect("JSON");
+    assert_eq!(report["variants"][0]["ended"]["how"], "completed");
+    assert!(recorded_s(&bench) > 0.0);
 }
 
 #[test]

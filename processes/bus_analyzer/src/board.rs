@@ -160,7 +160,7 @@ impl BusAnalyzer {
 
     fn give_up(&mut self, at: Ns, error: &mcap::McapError) {
         self.record = None;
-        self.lost = Some(Lost { at, reason: reason(error) });
+        self.lost = Some(Lost { at, reason: reason(error), errno: errno(error) });
     }
 }
 
@@ -205,7 +205,8 @@ impl Board for BusAnalyzer {
             self.give_up(inputs.until, &error);
         }
         if recorded && let Some(lost) = &self.lost {
-            out.mail.events.push(Event::new(lost.at, EventKind::RecordLost, Severity::Error, 0.0, 0.0));
+            let errno = f64::from(lost.errno);
+            out.mail.events.push(Event::new(lost.at, EventKind::RecordLost, Severity::Error, errno, 0.0));
         }
     }
 }
@@ -228,6 +229,14 @@ fn metadata(scenario: &Scenario) -> BTreeMap<String, String> {
         ("cards".into(), cards.join(",")),
         ("tasks".into(), tasks.join(",")),
     ])
+}
+
+/// The operating system's number for it; 0 where the error does not come from there.
+fn errno(error: &mcap::McapError) -> i32 {
+    match error {
+        mcap::McapError::Io(error) => error.raw_os_error().unwrap_or(0),
+        _ => 0,
+    }
 }
 
 /// The operating system's own words, where the error comes from there.

@@ -44,6 +44,8 @@ pub struct Lost {
     pub at: Ns,
     /// What the operating system said.
     pub reason: String,
+    /// Its number for it; 0 = none.
+    pub errno: i32,
 }
 
 /// An open record.

@@ -59,9 +59,7 @@ pub struct Finished {
     pub result: VariantResult,
     /// Why it ended before its time, where it did.
     pub error: Option<RunError>,
-    /// The record is incomplete: it could not be written to its end.
-    pub record_lost: bool,
-    /// What else was lost although the run went on, in words.
+    /// What was lost although the run went on, in words.
     pub losses: Vec<String>,
     /// Wall time from the start to the first window.
     pub start_up: Duration,
@@ -94,7 +92,6 @@ pub fn run(
         },
         reached: 0,
         diverged: false,
-        record_lost: false,
         losses: Vec::new(),
         windows: 0,
         start_up: Duration::ZERO,
@@ -116,8 +113,8 @@ pub fn run(
         result.measured.clone_from(&measurement.rows);
     }
     result.wall_s = Some(windows.as_secs_f64());
-    let Witness { record_lost, losses, start_up, .. } = witness;
-    Ok(Finished { result, error, record_lost, losses, start_up, windows, measurement })
+    let Witness { losses, start_up, .. } = witness;
+    Ok(Finished { result, error, losses, start_up, windows, measurement })
 }
 
 fn carry_out(
@@ -143,7 +140,7 @@ fn carry_out(
             witness.shown = rack.folder().map(Shown::new);
             let ran = rack.run(end, witness);
             witness.ended = witness.start.elapsed();
-            witness.losses = rack.losses().to_vec();
+            witness.losses.extend_from_slice(rack.losses());
             witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
             ran?;
             rack.finish()
@@ -155,6 +152,7 @@ fn carry_out(
             witness.shown = rack.folder().map(Shown::new);
             let ran = rack.run(end, witness);
             witness.ended = witness.start.elapsed();
+            witness.losses.extend_from_slice(rack.losses());
             witness.trace.bus = Some(witness.accounting.close(rack.timing(), &rack.programs()));
             ran?;
             rack.finish(witness)
@@ -210,7 +208,6 @@ struct Witness<'a> {
     status: Status,
     reached: Ns,
     diverged: bool,
-    record_lost: bool,
     losses: Vec<String>,
     windows: u64,
     start_up: Duration,
@@ -262,7 +259,10 @@ impl Observer for Witness<'_> {
         self.trace.window(&mail.plant_probe, &mail.control_probe, &mail.events);
         let programs = log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program);
         programs.for_each(|transfer| self.ledger.push(transfer));
-        self.record_lost |= mail.events.iter().any(|event| event.kind == EventKind::RecordLost as u32);
+        for event in mail.events.iter().filter(|event| event.kind == EventKind::RecordLost as u32) {
+            let (at_s, reason) = (event.t as f64 * 1e-9, std::io::Error::from_raw_os_error(event.a as i32));
+            self.losses.push(format!("the record ends at {at_s:.3} s of simulated time: {reason}"));
+        }
         self.diverged |= mail.plant_probe.iter().any(|probe| probe.status & drive_status::DIVERGED != 0);
         (self.progress)(until);
         self.show(until, mail);

@@ -76,7 +76,9 @@ impl Workstation {
             match entry.fault.kind {
                 FaultKind::StaleCommand => stale = sender.newest_sent(),
                 FaultKind::WrongCommand => sender.interpose(now, entry.fault.amount),
-                _ => {}
+                FaultKind::Gone => {}
+                // whoever takes the console down tells of it
+                _ => return,
             }
             let number = entry.number as f64;
             out.mail.events.push(Event::new(now, EventKind::FaultInjected, Severity::Warn, number, 0.0));
@@ -122,6 +124,10 @@ impl Workstation {
 impl Board for Workstation {
     fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
         if inputs.boot {
+            if inputs.until > 0 {
+                // started again in a running rack: what has begun before has been told of
+                self.schedule.advance(&mut self.progress, inputs.until - 1, |_, _| {});
+            }
             out.programs.push((self.task, self.program()));
         }
         if let Some(telemetry) = inputs.mail.telemetry.last() {

@@ -45,7 +45,7 @@ pub enum EventKind {
     MessageLost = 12,
     /// An axis of the force sensor is saturated; `a` = error word.
     ForceSaturated = 13,
-    /// The record cannot be written any more; what follows is not recorded.
+    /// The record cannot be written any more, for the operating system's error number `a`; what follows is not recorded.
     RecordLost = 14,
     /// The release of job `a` of task `b` found the job before still running, and the task was stopped for good.
     OverrunTrip = 15,

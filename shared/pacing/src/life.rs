@@ -31,8 +31,6 @@ pub(crate) struct Life {
     pub losses: Vec<String>,
     /// Restarts of processes that died unplanned.
     restarted: Vec<String>,
-    /// Processes may be started again.
-    restarts: bool,
     /// What the drives see of da_io while it is down.
     pub lines: Lines,
     /// What the chassis has to send with the next window.
@@ -48,15 +46,9 @@ impl Life {
             died: Vec::new(),
             losses: Vec::new(),
             restarted: Vec::new(),
-            restarts: false,
             lines: Lines::new(scenario),
             mail: Mail::default(),
         }
-    }
-
-    /// From now on processes that the run can do without are started again.
-    pub fn allow_restarts(&mut self) {
-        self.restarts = true;
     }
 
     /// How the process died since the last window, if it did.
@@ -91,7 +83,7 @@ impl Boards<'_> {
             Restart::Once => !self.life.restarted.iter().any(|name| name == process),
             Restart::Always => true,
         };
-        if !(self.life.restarts && again) {
+        if !again {
             return false;
         }
         if !self.life.died.iter().any(|(name, _)| name == process) {
@@ -100,6 +92,22 @@ impl Boards<'_> {
             self.mark_down(&boards);
         }
         true
+    }
+
+    /// In real time nobody waits for a new process: the run goes on without those that have died. True where there are any.
+    pub fn go_on_without(&mut self) -> bool {
+        let died = std::mem::take(&mut self.life.died);
+        for (process, how) in &died {
+            let when = at(self.reached);
+            self.life.losses.push(format!("process `{process}` {how}, {when}; the run went on without it"));
+            let stated = self.context.scenario.processes.iter().filter(|stated| stated.name == *process);
+            for board in stated.flat_map(scenario::Process::board_ids) {
+                let number = f64::from(board as u8);
+                let event = Event::new(self.reached, EventKind::BoardLost, Severity::Error, number, 0.0);
+                self.life.mail.events.push(event);
+            }
+        }
+        !died.is_empty()
     }
 
     /// Carries out what is due at `now`, between two windows. `rest` holds the rest of each task's jobs.
@@ -111,7 +119,7 @@ impl Boards<'_> {
             let (_, boards, planned) = self.life.returns.remove(i);
             self.come_up(now, &boards, timing, rest)?;
             if !planned {
-                self.tasks_of(&boards).for_each(|task| timing.restart(task));
+                self.tasks_of(&boards).into_iter().for_each(|task| timing.restart(task));
             }
         }
         while self.life.outages.front().is_some_and(|outage| outage.from <= now) {
@@ -161,7 +169,7 @@ impl Boards<'_> {
         let up = now + scenario::nanoseconds(stated.boot_ms * 1e-3);
         self.life.losses.push(format!("process `{process}` {how}, {}; it is started again", at(now)));
         self.life.restarted.push(process.to_owned());
-        self.tasks_of(&boards).for_each(|task| timing.halt(task));
+        self.tasks_of(&boards).into_iter().for_each(|task| timing.halt(task));
         for board in &boards {
             let event = Event::new(now, EventKind::BoardLost, Severity::Error, f64::from(*board as u8), 0.0);
             self.life.mail.events.push(event);
@@ -186,7 +194,7 @@ impl Boards<'_> {
         }
         self.life.down &= !mask(boards);
         self.show_down();
-        for task in self.tasks_of(boards).collect::<Vec<_>>() {
+        for task in self.tasks_of(boards) {
             rest[usize::from(task)].clear();
         }
         for board in boards {
@@ -233,9 +241,7 @@ impl Boards<'_> {
         }
     }
 
-    fn tasks_of(&self, boards: &[BoardId]) -> impl Iterator<Item = u16> + use<> {
-        let tasks: Vec<u16> =
-            (0..).zip(&self.of_task).filter(|(_, board)| boards.contains(board)).map(|(task, _)| task).collect();
-        tasks.into_iter()
+    fn tasks_of(&self, boards: &[BoardId]) -> Vec<u16> {
+        (0..).zip(&self.of_task).filter(|(_, board)| boards.contains(board)).map(|(task, _)| task).collect()
     }
 }

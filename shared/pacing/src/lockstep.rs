@@ -65,8 +65,7 @@ impl<'f> Lockstep<'f> {
         programs: &dyn Fn(&scenario::Process) -> Vec<String>,
         interrupted: &'static AtomicBool,
     ) -> Result<Lockstep<'f>, RunError> {
-        let (mut boards, timing) = Boards::power_up(context, factory, programs, interrupted)?;
-        boards.life.allow_restarts();
+        let (boards, timing) = Boards::power_up(context, factory, programs, interrupted)?;
         Ok(Lockstep {
             ahead: timing.clone(),
             rest: vec![Vec::new(); timing.rack().tasks.len()],

@@ -130,6 +130,11 @@ impl<'f> Realtime<'f> {
         self.boards.power.pids()
     }
 
+    /// What was lost on the way although the run went on, in words.
+    pub fn losses(&self) -> &[String] {
+        &self.boards.life.losses
+    }
+
     /// Simulated time reached.
     pub fn now(&self) -> Ns {
         self.boards.reached
@@ -250,6 +255,9 @@ impl<'f> Realtime<'f> {
 
     fn grant(&mut self, grant: &Grant) -> Result<(), RunError> {
         let board = grant.board as usize;
+        if self.boards.life.is_down(BOARDS[board]) {
+            return Ok(());
+        }
         match self.boards.place[board] {
             None => self.local.push(*grant, &self.boards.transfers[board]),
             Some(remote) => {
@@ -308,6 +316,7 @@ impl<'f> Realtime<'f> {
         {
             let Some((window, Draft { from, until, log, trips, .. })) = self.told.pop_front() else { break };
             self.own_mail.clear();
+            self.own_mail.events.append(&mut self.boards.life.mail.events);
             self.own_mail.transfers.extend(program_transfers(&log).map(TransferRecord::from));
             self.own_mail.events.extend(trips.iter().map(|(at, task, job)| {
                 let (job, task) = ((*job).into(), (*task).into());
@@ -336,20 +345,28 @@ impl<'f> Realtime<'f> {
         }
         self.watched = Instant::now();
         self.boards.watch()?;
-        let Boards { power, remotes, reached, .. } = &self.boards;
+        let mut stalled = None;
+        let Boards { power, remotes, .. } = &self.boards;
         for (debt, remote) in self.debts.iter_mut().zip(remotes).filter(|(debt, _)| debt.grants > 0) {
             let used = *debt.used.get_or_insert_with(|| power.used(&remote.process));
             if debt.since.elapsed() > STALL {
                 if let Some(how) = power.idle(&remote.process, used) {
-                    return Err(RunError::Stalled {
-                        process: remote.process.clone(),
-                        how: how.into(),
-                        waited_s: debt.since.elapsed().as_secs_f64(),
-                        when: at(*reached),
-                    });
+                    stalled = Some((remote.process.clone(), how, debt.since.elapsed().as_secs_f64()));
                 }
                 // starved, not stalled
                 (debt.since, debt.used) = (Instant::now(), None);
+            }
+        }
+        if let Some((process, how, waited_s)) = stalled
+            && !self.boards.outlives(&process, &format!("was stalled ({how})"))
+        {
+            return Err(RunError::Stalled { process, how: how.into(), waited_s, when: at(self.boards.reached) });
+        }
+        if self.boards.go_on_without() {
+            for board in BOARDS.iter().filter(|board| self.boards.life.is_down(**board)) {
+                if let Some(remote) = self.boards.place[*board as usize] {
+                    self.debts[remote].grants = 0;
+                }
             }
         }
         Ok(())

@@ -57,6 +57,8 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
     let mut line = Line::open(&domain, name, context.measure)?;
     let bells = Bells::open(&folder.path.join("bells"), processes.len() + 1)?;
     let mut bell = bells.bell(index + 1);
+    // what rang before was for a process that this one replaces
+    bell.rung();
     let mut host = Host::new(&here, exchange, &context, factory)?;
     if context.measure {
         host.measure(false);

@@ -95,7 +95,7 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
         for loss in &finished.losses {
             eprintln!("warning: variant {}: {loss}", variant.name);
         }
-        losses |= finished.record_lost || !finished.losses.is_empty();
+        losses |= !finished.losses.is_empty();
         // a run that ends before it begins has none
         if let Some(record) = record.as_ref().filter(|record| !failed || record.exists()) {
             let is_recorder_down = |outage: &scenario::Outage| outage.boards.contains(&BoardId::BusAnalyzer);
@@ -246,7 +246,11 @@ fn refused(origin: &str, key: &str, message: &str) -> ScenarioError {
 fn settle_record(record: &Path, broken: bool) -> Result<String, String> {
     if broken && bus_analyzer::digest_file(record).is_err() {
         let whole = record.with_extension("mcap.part");
-        let recovered = bus_analyzer::recover(record, &whole).map_err(|error| error.to_string())?;
+        let recovered = bus_analyzer::recover(record, &whole).map_err(|error| {
+            // half a file is of no use; there may be none
+            let _ = std::fs::remove_file(&whole);
+            error.to_string()
+        })?;
         std::fs::rename(&whole, record).map_err(|error| error.to_string())?;
         eprintln!("record made whole: {recovered}");
     }

@@ -135,6 +135,7 @@ impl<'f> Boards<'f> {
         let board_named = |name: &str| BoardId::from_name(name).unwrap_or(BoardId::Chassis);
         let recorder = place[BoardId::BusAnalyzer as usize];
         let alone = place.iter().filter(|process| **process == recorder).count() == 1;
+        let spans = context.measure.then(Vec::new);
         let mut boards = Boards {
             host,
             remotes,
@@ -154,7 +155,7 @@ impl<'f> Boards<'f> {
             faults: faults.into_iter().map(|occurrence| occurrence.fault).collect(),
             window: 0,
             reached: 0,
-            spans: context.measure.then(Vec::new),
+            spans,
             recorder_owes: 0,
             recorder_sleeps: 0,
             // in a process with others, its grants must not stand in theirs' way

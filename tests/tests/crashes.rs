@@ -89,7 +89,9 @@ fn harm(name: &str, with: Signal, delay: Duration) {
 /// The same with a process that the run goes on without: it is started again.
 fn harm_and_go_on(name: &str, with: Signal, delay: Duration) {
     let bench = Bench::new();
-    let mut run = start_for(&bench, "12", delay);
+    let mut run = start_for(&bench, "12", Duration::ZERO);
+    wait_for_record(&bench);
+    run.pause(delay);
     let victim = run.processes().into_iter().find(|process| process.name == name);
     let victim = victim.unwrap_or_else(|| panic!("no process `{name}`"));
     run.mark();

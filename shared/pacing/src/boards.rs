@@ -358,14 +358,14 @@ impl<'f> Boards<'f> {
     /// Grants the recorder the window and does not wait for it; it is woken for some windows at a time, and may lag by
     /// [`RECORDER_CREDIT`].
     pub fn grant_recorder(&mut self, grant: &Grant) -> Result<(), RunError> {
+        if self.life.is_down(BoardId::BusAnalyzer) {
+            return Ok(());
+        }
         let board = BoardId::BusAnalyzer as usize;
         let Some(remote) = self.place[board] else {
             self.host.step(grant, &[])?;
             return Ok(());
         };
-        if self.life.is_down(BoardId::BusAnalyzer) {
-            return Ok(());
-        }
         self.recorder_owes += 1;
         self.recorder_sleeps += 1;
         let wake = self.recorder_sleeps >= self.recorder_batch;

@@ -1,7 +1,7 @@
 //! One run, watched: what it leaves in memory, ended as soon as there is nothing more to see.
 
 use crate::boards;
-use crate::rack_run::{self, INTERRUPTED};
+use crate::rack_run::INTERRUPTED;
 use board::{Mail, Ns};
 use messages::{EventKind, drive_status};
 use pacing::{Context, Flow, Lockstep, Observer, RunError};
@@ -28,12 +28,7 @@ pub struct Seen {
 /// process for each board.
 pub fn watch(scenario: Scenario, fault: Ns, end: Ns, processes: bool) -> Result<Seen, String> {
     let mut watcher = Watcher { seen: Seen::default(), fault, braked: None };
-    let scenario = if processes {
-        scenario
-    } else {
-        Scenario { processes: vec![rack_run::everything_in_the_chassis()], ..scenario }
-    };
-    run(scenario, end, &mut watcher).map_err(|error| error.to_string())?;
+    run(scenario, end, !processes, &mut watcher).map_err(|error| error.to_string())?;
     Ok(watcher.seen)
 }
 
@@ -42,13 +37,13 @@ pub fn watch(scenario: Scenario, fault: Ns, end: Ns, processes: bool) -> Result<
 pub fn watch_for_trips(scenario: Scenario) -> Result<(Quiet, Ns), String> {
     let mut quiet = Quiet::default();
     let end = scenario.duration_ns();
-    let scenario = Scenario { processes: vec![rack_run::everything_in_the_chassis()], ..scenario };
-    run(scenario, end, &mut quiet).map_err(|error| error.to_string())?;
+    run(scenario, end, true, &mut quiet).map_err(|error| error.to_string())?;
     Ok((quiet, end))
 }
 
-fn run(scenario: Scenario, end: Ns, observer: &mut dyn Observer) -> Result<(), RunError> {
-    let context = Context { prefix: String::new(), variant: String::new(), record: None, measure: false, scenario };
+fn run(scenario: Scenario, end: Ns, in_process: bool, observer: &mut dyn Observer) -> Result<(), RunError> {
+    let (prefix, variant) = (String::new(), String::new());
+    let context = Context { prefix, variant, record: None, measure: false, in_process, scenario };
     let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
     rack.run(end, observer)?;
     rack.finish()

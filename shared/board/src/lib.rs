@@ -13,7 +13,7 @@ pub use mail::Mail;
 pub use messages::BoardId;
 pub use vme::{Ns, Op, Program};
 
-use messages::TransferRecord;
+use messages::{Defect, TransferRecord};
 
 /// A board of the rack (or the arm, or a user's program in the place of one).
 pub trait Board: Send {
@@ -45,6 +45,8 @@ pub struct Inputs {
     pub transfers: Vec<TransferRecord>,
     /// What other boards sent since the last step.
     pub mail: Mail,
+    /// What was wrong with messages that came since the last step.
+    pub defects: Vec<Defect>,
 }
 
 /// A task at its decision point.

@@ -4,6 +4,7 @@
 
 use crate::affinity::OneProcessor;
 use crate::error::at;
+use crate::faults::{Injections, tampering};
 use crate::host::{Answer, Factory, Host};
 use crate::remote::{READY, Remote};
 use crate::serve::{CHASSIS_BELL, process_of};
@@ -41,8 +42,8 @@ pub(crate) struct Boards {
     of_slave: Vec<BoardId>,
     /// Transfers made to each board in the window.
     pub transfers: [Vec<TransferRecord>; BOARDS.len()],
-    /// The scenario's numbers of the timing plane's faults.
-    pub faults: Vec<usize>,
+    /// The faults that the chassis tells of.
+    pub injections: Injections,
     /// Number of the window.
     pub window: u64,
     /// Simulated time reached.
@@ -77,7 +78,7 @@ impl Boards {
         interrupted: &'static AtomicBool,
     ) -> Result<(Boards, Timing), RunError> {
         let scenario = context.scenario.clone();
-        let (fault_plan, faults) = scenario.fault_plan();
+        let (fault_plan, _) = scenario.fault_plan();
         let mut timing = Timing::with_faults(scenario.rack.clone(), fault_plan)?;
         let place = BOARDS.map(|board| process_of(&scenario, board));
         let away: Vec<usize> = (0..scenario.processes.len()).filter(|i| place.contains(&(i + 1))).collect();
@@ -100,7 +101,8 @@ impl Boards {
             domain = Some(joined);
             folder = Some(run_folder);
         }
-        let exchange = Exchange::open(&here, domain.as_ref(), |board| place[board as usize])?;
+        let exchange =
+            Exchange::open(&here, domain.as_ref(), |board| place[board as usize], &tampering(&scenario))?;
         let mut host = Host::new(&here, exchange, &context, factory)?;
         if context.measure {
             host.measure(false);
@@ -128,7 +130,7 @@ impl Boards {
             of_task: scenario.rack.tasks.iter().map(|task| board_named(&task.board)).collect(),
             of_slave: scenario.rack.slaves.iter().map(|slave| board_named(&slave.board)).collect(),
             transfers: Default::default(),
-            faults: faults.into_iter().map(|occurrence| occurrence.fault).collect(),
+            injections: Injections::new(&scenario),
             window: 0,
             reached: 0,
             spans: context.measure.then(Vec::new),

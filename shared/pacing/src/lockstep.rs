@@ -165,17 +165,11 @@ impl Lockstep {
             self.answered(i)?;
         }
         self.own_mail.clear();
-        match stop {
-            Stop::Overrun { task, job } => {
-                self.ahead.halt(task);
-                let event = Event::new(until, EventKind::OverrunTrip, Severity::Error, job.into(), task.into());
-                self.own_mail.events.push(event);
-            }
-            Stop::Fault { fault } => {
-                let fault = self.boards.faults[usize::from(fault)] as f64;
-                self.own_mail.events.push(Event::new(until, EventKind::FaultInjected, Severity::Warn, fault, 0.0));
-            }
-            Stop::Limit | Stop::Decision { .. } => {}
+        self.boards.injections.tell(until, &mut self.own_mail.events);
+        if let Stop::Overrun { task, job } = stop {
+            self.ahead.halt(task);
+            let event = Event::new(until, EventKind::OverrunTrip, Severity::Error, job.into(), task.into());
+            self.own_mail.events.push(event);
         }
         observer.account(until, &self.log, &mut self.own_mail);
         self.record(from, until)?;

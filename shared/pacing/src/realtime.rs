@@ -308,6 +308,7 @@ impl Realtime {
         {
             let Some((window, Draft { from, until, log, trips, .. })) = self.told.pop_front() else { break };
             self.own_mail.clear();
+            self.boards.injections.tell(until, &mut self.own_mail.events);
             self.own_mail.transfers.extend(program_transfers(&log).map(TransferRecord::from));
             self.own_mail.events.extend(trips.iter().map(|(at, task, job)| {
                 let (job, task) = ((*job).into(), (*task).into());
@@ -318,7 +319,7 @@ impl Realtime {
             self.boards.transfers[BoardId::BusAnalyzer as usize].clear();
             let grant = Grant { window, ..self.boards.grant_of(BoardId::BusAnalyzer, from, until, 0) };
             self.grant(&grant)?;
-            let mail = self.boards.host.fetch(BoardId::Chassis, self.boards.reached)?;
+            let mail = self.boards.host.fetch(BoardId::Chassis, until, self.boards.reached)?;
             self.boards.reached = until;
             let flow = observer.window(until, mail, &log);
             mail.clear();

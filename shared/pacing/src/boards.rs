@@ -14,7 +14,7 @@ use channels::{Bell, Bells, Domain, Exchange};
 use messages::{BOARDS, Grant, NOBODY, Span, TransferRecord, flags};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use vme::{Log, Origin, Timing, Transfer};
+use vme::{Log, Origin, Status, Timing, Transfer};
 
 /// How often a wait looks whether everybody still lives.
 pub(crate) const WATCH_PERIOD: Duration = Duration::from_millis(50);
@@ -247,12 +247,17 @@ impl Boards {
         }
     }
 
-    /// Sorts the transfers of a window by the board that they are made to.
+    /// Sorts the transfers of a window by the board that they are made to; those that failed go to the one that asked, too.
     pub fn sort_transfers(&mut self, log: &Log) {
         self.transfers.iter_mut().for_each(Vec::clear);
         for transfer in program_transfers(log) {
-            if let Some(slave) = transfer.slave {
-                self.transfers[self.of_slave[usize::from(slave)] as usize].push(transfer.into());
+            let to = transfer.slave.map(|slave| self.of_slave[usize::from(slave)]);
+            let asked = self.of_task[usize::from(transfer.task)];
+            if let Some(to) = to {
+                self.transfers[to as usize].push(transfer.into());
+            }
+            if transfer.status != Status::Ok && to != Some(asked) {
+                self.transfers[asked as usize].push(transfer.into());
             }
         }
     }

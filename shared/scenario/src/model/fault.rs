@@ -109,7 +109,7 @@ fault_kinds! {
     Starvation = "starvation";
     /// Bus: nobody is granted.
     StuckBus = "stuck-bus";
-    /// Interrupter: its events raise nothing.
+    /// Interrupter: its events raise nothing; after two in a row the handler's card goes on by polling.
     LostInterrupt = "lost-interrupt";
     /// Adaptor: its cable is out.
     CableOut = "cable-out";

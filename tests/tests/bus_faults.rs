@@ -90,9 +90,9 @@ fn a_job_that_takes_too_long_costs_a_release_and_the_card_sees_it() {
 
 #[test]
 fn clocks_that_drift_apart_are_seen_by_their_stamps_and_set_anew() {
-    // 200 µs at 1000 ppm take 200 ms, and the comparison's window 100 ms
+    // 200 µs at 1000 ppm take 200 ms; the first window of 100 ms that lies behind that ends 200 ms later at most
     for board in ["control_computer", "encoder_if"] {
-        expect(fault(board, "clock-drift", &[("amount", 1000.0)]), &[], ("clock-slope", 310.0, "run"));
+        expect(fault(board, "clock-drift", &[("amount", 1000.0)]), &[], ("clock-slope", 410.0, "run"));
     }
 }
 
@@ -129,12 +129,13 @@ fn faults_of_messages_and_of_the_bus_leave_their_event_in_real_time_too() {
     let report: Json = serde_json::from_str(&outcome.stdout).unwrap_or_else(|_| panic!("{}", outcome.stderr));
     let rows = report["variants"][0]["faults"].as_array().expect("rows");
     let begins: Vec<_> = rows.iter().map(|row| row["injected_s"].as_f64().expect("number")).collect();
-    assert_eq!(begins, [0.402, 0.602]);
+    assert_eq!(begins.len(), 2, "{rows:?}");
+    assert!((begins[0] - 0.402).abs() < 1e-9 && (begins[1] - 0.602).abs() < 1e-9, "{begins:?}");
 }
 
 #[test]
 fn an_amount_that_makes_no_sense_is_refused_with_its_range() {
-    for (kind, amount, range) in [("drop", 1.5, "0 to 1"), ("bit-flip", 0.0, "1 to 32"), ("delay", 0.0, "0.001 to 10000")] {
+    for (kind, amount, range) in [("drop", 1.5, "0 to 1"), ("bit-flip", 40.0, "1 to 32"), ("delay", 0.0, "0.001 to 10000")] {
         let bench = Bench::new();
         let bad = fault("encoder_if", kind, &[("amount", amount)]);
         let scenario = bench.scenario("bad.toml", &[("fault", Value::Array(vec![bad]))]);

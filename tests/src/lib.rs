@@ -9,12 +9,14 @@
 
 mod bench;
 mod draw;
+mod fault_row;
 mod machine;
 mod programs;
 mod running;
 
 pub use bench::{Bench, Edit};
 pub use draw::Draw;
+pub use fault_row::{FaultRow, fault};
 pub use machine::{Process, Signal, signal};
 pub use programs::{program, target_folder, workspace};
 pub use running::{Outcome, Running};

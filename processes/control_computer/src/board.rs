@@ -1,9 +1,10 @@
 //! The control computer as a board: registers in, one control job, registers out.
 //!
 //! Everything that depends on the bus is here: which read answers what, when a command has arrived, what the dual-ported
-//! RAM shows at which instant. A read that ends in BERR* leaves its word out; the sensors then hold the last value. A job
-//! allocates nothing unless the list of its writes changes.
+//! RAM shows at which instant. A read that ends in BERR* leaves its word out, as a message that gets lost does; the sensors
+//! then hold the last value. A job allocates nothing unless the list of its writes changes.
 
+use crate::clocks::Clocks;
 use crate::commands::{self, Refusal};
 use crate::findings::Findings;
 use crate::frame::quaternion_wxyz;
@@ -15,7 +16,7 @@ use crate::safety::State;
 use crate::second_card::SecondCard;
 use crate::sensors::Sensors;
 use board::{Board, Inputs, Outputs};
-use messages::{Command, CommandKind, ControlProbe, Detector, Event, EventKind, Severity, Telemetry, TransferRecord, limits};
+use messages::{BoardId, Command, CommandKind, ControlProbe, Defect, DefectKind, Detector, Event, EventKind, Severity, Telemetry, TransferRecord, limits};
 use scenario::Scenario;
 use vme::Ns;
 
@@ -34,6 +35,11 @@ pub struct ControlComputer {
     /// Activation number of the last job, and how many in a row began after a lost release.
     last_job: Option<u32>,
     late_jobs: u32,
+    /// The task is released by an interrupt.
+    interrupted: bool,
+    clocks: Clocks,
+    /// What was wrong with messages since the last job.
+    defects: Vec<Defect>,
     program: BusProgram,
     sensors: Sensors,
     findings: Findings,
@@ -101,6 +107,9 @@ impl ControlComputer {
             ),
             last_job: None,
             late_jobs: 0,
+            interrupted: matches!(scenario.rack.tasks[usize::from(task)].release, vme::rack::Release::Interrupt(_)),
+            clocks: Clocks::new(&scenario.safety),
+            defects: Vec::with_capacity(ON_THE_WAY),
             sensors: Sensors::new(scenario, program.sensors())?,
             program,
             findings: Findings::new(),
@@ -148,6 +157,22 @@ impl ControlComputer {
         }
     }
 
+    /// An access of an own task that ended without data: BERR*, or no grant.
+    fn failed(&mut self, transfer: &TransferRecord, out: &mut Outputs) {
+        let Some(why) = why_failed(transfer) else { return };
+        let (sensors, findings) = match &mut self.end {
+            _ if transfer.task == self.task => (&mut self.sensors, &mut self.findings),
+            End::SecondCard { card, .. } if transfer.task == card.task() => card.bus_ends(),
+            _ => return,
+        };
+        sensors.failed(transfer.index, why);
+        if findings.notice(why, transfer.addr.into(), transfer.data_at, out) {
+            let (job, address) = (transfer.job.into(), transfer.addr.into());
+            let event = Event::new(transfer.data_at, EventKind::BusError, Severity::Warn, job, address);
+            out.mail.events.push(event.because(Some(why)));
+        }
+    }
+
     fn judge(&mut self, command: &Command) -> Result<(), Refusal> {
         if command.epoch <= self.epoch {
             // whoever repeats an old command does not know how far the arm has come
@@ -187,12 +212,7 @@ impl ControlComputer {
     fn job(&mut self, job: u32, t: Ns, now: Ns, out: &mut Outputs) {
         let since = self.last.map_or(self.period_ns, |last| now.saturating_sub(last).max(1));
         let dt = since as f64 * 1e-9;
-        if let Some(register) = self.sensors.read(job, dt) {
-            let address = self.program.register_address(register).into();
-            let severity = Severity::Warn;
-            let event = Event::new(t, EventKind::BusError, severity, job.into(), address);
-            out.mail.events.push(event.because(Some(Detector::BusError)));
-        }
+        self.sensors.read(job, dt);
         self.findings.begin();
         self.sensors.report(&mut self.findings);
         self.supervise(job, t, now);
@@ -251,6 +271,15 @@ impl ControlComputer {
         if let Some(cause) = self.hold {
             findings.report(cause, State::Hold, self.epoch.into());
         }
+        for defect in self.defects.drain(..) {
+            // commands are sent again, and a message that came twice does no harm
+            let harmless = defect.from == BoardId::Workstation || defect.kind == DefectKind::Repeated;
+            let demand = if harmless { State::Run } else { State::Degraded };
+            findings.report(defect.detector(), demand, defect.figure);
+        }
+        if let Some(ppm) = self.clocks.compare(now, self.sensors.stamps()) {
+            findings.report(Detector::ClockSlope, State::Run, ppm);
+        }
         let (period, polled) = self.console;
         if let Some(polled) = polled
             && limits.max_missed_polls > 0
@@ -263,7 +292,8 @@ impl ControlComputer {
         self.late_jobs = if lost > 0 { self.late_jobs + 1 } else { 0 };
         if lost > 0 {
             let stop = limits.max_late_jobs > 0 && self.late_jobs > limits.max_late_jobs;
-            findings.report(Detector::Overrun, if stop { State::Stop } else { State::Degraded }, lost.into());
+            let detector = if self.interrupted { Detector::MissedTick } else { Detector::Overrun };
+            findings.report(detector, if stop { State::Stop } else { State::Degraded }, lost.into());
         }
         if let End::Drives(output) = &self.end {
             self.sensors.report_brakes(now, output.brakes(), findings);
@@ -353,12 +383,30 @@ impl ControlComputer {
     }
 }
 
+/// What sees that a transfer has failed, where it has.
+fn why_failed(transfer: &TransferRecord) -> Option<Detector> {
+    match transfer.status {
+        0 => None,
+        1 => Some(Detector::BusError),
+        _ => Some(Detector::AccessTimer),
+    }
+}
+
 impl Board for ControlComputer {
     fn step(&mut self, now: Ns, inputs: &Inputs, out: &mut Outputs) {
         if inputs.boot {
             out.programs.push((self.task, self.program.until_decision()));
             if let End::SecondCard { card, .. } = &self.end {
                 out.programs.push((card.task(), card.program()));
+            }
+        }
+        let now = self.clocks.corrected(now);
+        for defect in &inputs.defects {
+            if defect.from != BoardId::Workstation {
+                self.sensors.lost(defect.detector());
+            }
+            if self.defects.len() < ON_THE_WAY {
+                self.defects.push(*defect);
             }
         }
         for word in &inputs.mail.words {
@@ -376,6 +424,7 @@ impl Board for ControlComputer {
             self.on_the_way.push(*command);
         }
         for transfer in &inputs.transfers {
+            self.failed(transfer, out);
             self.served(transfer, out);
         }
         if let Some(decision) = inputs.decision {

@@ -16,18 +16,20 @@ pub struct Findings {
     /// Bit n: detector number n fires in this job; in the one before.
     firing: u64,
     before: u64,
+    /// The same of those that fire between two jobs.
+    noticed: u64,
     figures: [f64; DETECTORS.len() + 1],
 }
 
 impl Findings {
     /// Nothing found yet.
     pub fn new() -> Findings {
-        Findings { demand: State::Run, cause: None, firing: 0, before: 0, figures: [0.0; DETECTORS.len() + 1] }
+        Findings { demand: State::Run, cause: None, firing: 0, before: 0, noticed: 0, figures: [0.0; DETECTORS.len() + 1] }
     }
 
     /// A new job begins.
     pub fn begin(&mut self) {
-        (self.before, self.firing) = (self.firing, 0);
+        (self.before, self.firing) = (self.firing | std::mem::take(&mut self.noticed), 0);
         (self.demand, self.cause) = (State::Run, None);
     }
 
@@ -39,6 +41,18 @@ impl Findings {
             self.figures[detector as usize] = figure;
         }
         self.firing |= bit;
+    }
+
+    /// `detector` fires between two jobs, at `t`, and demands nothing by itself. Whether that is news: it did not fire in
+    /// the job before.
+    pub fn notice(&mut self, detector: Detector, figure: f64, t: Ns, out: &mut Outputs) -> bool {
+        let bit = 1 << detector as u32;
+        let news = (self.firing | self.noticed) & bit == 0;
+        self.noticed |= bit;
+        if news {
+            out.mail.events.push(detected(detector, figure, t));
+        }
+        news
     }
 
     /// Another card demands this state, and has told of it itself.
@@ -58,11 +72,14 @@ impl Findings {
         for detector in DETECTORS {
             if (self.firing & !self.before) >> *detector as u32 & 1 == 1 {
                 let figure = self.figures[*detector as usize];
-                let event = Event::new(t, EventKind::Detected, Severity::Warn, figure, 0.0);
-                out.mail.events.push(event.because(Some(*detector)));
+                out.mail.events.push(detected(*detector, figure, t));
             }
         }
     }
+}
+
+fn detected(detector: Detector, figure: f64, t: Ns) -> Event {
+    Event::new(t, EventKind::Detected, Severity::Warn, figure, 0.0).because(Some(detector))
 }
 
 #[cfg(test)]
@@ -87,6 +104,23 @@ mod tests {
         assert_eq!(findings.demanded(), (State::Off, Some(Detector::EmergencyStop)));
         findings.begin();
         assert_eq!(findings.demanded(), (State::Run, None));
+    }
+
+    #[test]
+    fn what_is_noticed_between_two_jobs_is_told_at_once_and_not_again_by_the_job() {
+        let mut findings = Findings::new();
+        for (job, news) in [true, false, false].into_iter().enumerate() {
+            let mut out = Outputs::default();
+            assert_eq!(findings.notice(Detector::BusError, 3.0, 5, &mut out), news, "{job}");
+            assert!(!findings.notice(Detector::BusError, 4.0, 6, &mut out));
+            assert_eq!(out.mail.events.len(), usize::from(news));
+            findings.begin();
+            findings.report(Detector::BusError, State::Degraded, 3.0);
+            assert_eq!(told(&findings), []);
+        }
+        findings.begin();
+        findings.begin();
+        assert!(findings.notice(Detector::BusError, 3.0, 7, &mut Outputs::default()));
     }
 
     #[test]

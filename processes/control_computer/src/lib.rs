@@ -16,12 +16,14 @@
 //! | `second_card`, `handover` | inverse dynamics, safety and D/A on the second card; what it is handed |
 //! | `output` | safety state and torques to the drives |
 //! | `commands` | what is refused |
+//! | `clocks` | clocks that drift apart |
 //! | `force_noise`, `disturbance` | how noisy the force is; torques that nothing accounts for |
 //! | `findings`, `safety` | what a job finds wrong, and what stops the arm |
 
 mod ahic;
 mod board;
 mod cholesky;
+mod clocks;
 mod commands;
 mod disturbance;
 mod erc;

@@ -266,11 +266,6 @@ impl BusProgram {
         }
     }
 
-    /// Address of a sensor register that the task reads.
-    pub fn register_address(&self, register: usize) -> u32 {
-        self.sensors.iter().position(|&read| read == register).map_or(0, |i| self.reads[i].addr)
-    }
-
     fn access(&self, write: Write) -> Access {
         match write {
             Write::Enable(_) => self.enable,

@@ -15,7 +15,7 @@ use crate::safety::State;
 use crate::sensors::Sensors;
 use arm::{ArmModel, ArmState, JointVector};
 use board::Outputs;
-use messages::{BusWord, Detector, Event, EventKind, Severity, TransferRecord};
+use messages::{BusWord, Detector, TransferRecord};
 use scenario::Scenario;
 use vme::Ns;
 
@@ -86,6 +86,11 @@ impl SecondCard {
         self.sensors.take(word);
     }
 
+    /// What an access of its task that fails concerns.
+    pub fn bus_ends(&mut self) -> (&mut Sensors, &mut Findings) {
+        (&mut self.sensors, &mut self.findings)
+    }
+
     /// A transfer made to its RAM by the first card.
     pub fn served(&mut self, transfer: &TransferRecord) {
         let Some([block, state]) = self.program.second else { return };
@@ -104,11 +109,7 @@ impl SecondCard {
         let since = self.last.map_or(self.period_ns, |last| now.saturating_sub(last).max(1));
         self.last = Some(now);
         let dt = since as f64 * 1e-9;
-        if let Some(register) = self.sensors.read(job, dt) {
-            let address = self.program.register_address(register).into();
-            let event = Event::new(t, EventKind::BusError, Severity::Warn, job.into(), address);
-            out.mail.events.push(event.because(Some(Detector::BusError)));
-        }
+        self.sensors.read(job, dt);
         let sensed = *self.sensors.sensed();
         let period = self.first.1;
         let (mut missing, mut acknowledge) = (0, false);

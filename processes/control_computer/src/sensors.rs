@@ -1,8 +1,9 @@
 //! From register contents to joint angles, speeds and the sensor's wrench.
 //!
 //! Counters wrap: they are unwrapped from job to job, starting from the posture that homing has left. A word that does not
-//! come (BERR*), or force words under an error of the receiver, leave the last value in place; how many jobs in a row a
-//! value has been held is counted, and the safety state machine decides what that means.
+//! come (BERR*, a lost message), or force words under an error of the receiver, leave the last value in place; how many
+//! jobs in a row a value has been held is counted, and the safety state machine decides what that means. A word that comes
+//! a job late is better than none: it is used, and counted too.
 
 use crate::findings::Findings;
 use crate::force_noise::ForceNoise;
@@ -49,7 +50,13 @@ pub struct Sensors {
     came: u32,
     /// Of those that came, the words that cannot be true, and why.
     refused: u32,
-    job: u32,
+    /// Why the words that did not come in the job under way did not: what the bus, and the messages, say of it.
+    why: [Option<Detector>; READS],
+    lost: Option<Detector>,
+    /// The last job's, as far as they are held.
+    why_held: [Detector; READS],
+    /// Jobs in a row that had to do with words of an earlier one.
+    late_jobs: u32,
     /// Jobs in a row in which word i did not come.
     held: [u32; READS],
     /// Unwrapped counts.
@@ -93,7 +100,10 @@ impl Sensors {
             registers: registers.to_vec(),
             came: 0,
             refused: 0,
-            job: 0,
+            why: [None; READS],
+            lost: None,
+            why_held: [Detector::Sequence; READS],
+            late_jobs: 0,
             held: [0; READS],
             counts: std::array::from_fn(|i| (posture[i] * counts_per_rad[i]).floor() as i64),
             counts_at: [0; JOINTS],
@@ -116,31 +126,46 @@ impl Sensors {
         })
     }
 
-    /// Takes the answer to a read of a job; answers of another job empty the block first.
+    /// Takes the answer to a read of a job; one of an older job than what is there comes too late.
     pub fn take(&mut self, word: &BusWord) {
         let Some(&index) = self.registers.get(usize::from(word.index)) else { return };
-        if word.job != self.job {
-            self.job = word.job;
-            self.came = 0;
+        if self.has(index) && is_older(word.job, self.words[index].job) {
+            return;
         }
         self.words[index] = *word;
         self.came |= 1 << index;
     }
 
-    /// Decodes the words of `job`, which begins `period_s` after the one before. Returns the first register whose read has
-    /// just failed, if any.
-    pub fn read(&mut self, job: u32, period_s: f64) -> Option<usize> {
-        let came = if self.job == job { self.came } else { 0 };
-        self.came = came;
+    /// The job's access of that number has ended without data; the detector says why.
+    pub fn failed(&mut self, access: u16, why: Detector) {
+        if let Some(&index) = self.registers.get(usize::from(access)) {
+            self.why[index] = Some(why);
+        }
+    }
+
+    /// A message with words of the job under way was discarded, or is known to be missing.
+    pub fn lost(&mut self, why: Detector) {
+        self.lost.get_or_insert(why);
+    }
+
+    /// When the cards stamped what the last job read afresh: encoders, force sensor, D/A and parallel I/O.
+    pub fn stamps(&self) -> [Option<Ns>; 3] {
+        [COUNTS, FORCES, STATUS].map(|index| (self.held[index] == 0).then_some(self.words[index].t).filter(|t| *t > 0))
+    }
+
+    /// Decodes the words of `job`, which begins `period_s` after the one before.
+    pub fn read(&mut self, job: u32, period_s: f64) {
+        let of = |these: &dyn Fn(u32) -> bool| {
+            let such = |index: &&usize| self.has(**index) && these(self.words[**index].job);
+            self.registers.iter().filter(such).fold(0, |bits, index| bits | 1 << index)
+        };
+        let early = of(&|other| is_older(job, other));
+        let late = of(&|other| is_older(other, job));
+        self.came &= !early;
+        count(&mut self.late_jobs, late != 0);
         self.errors = if self.has(ERRORS) { self.words[ERRORS].value } else { 0 };
         if self.errors & FORCE_INVALID != 0 {
             self.came &= !FORCE_WORDS;
-        }
-        let mut failed = None;
-        for &index in &self.registers {
-            if failed.is_none() && came & (1 << index) == 0 && self.held[index] == 0 {
-                failed = Some(index);
-            }
         }
         self.refused = 0;
         for joint in 0..JOINTS {
@@ -156,9 +181,10 @@ impl Sensors {
         for &index in &self.registers {
             let taken = (self.came & !self.refused) >> index & 1 == 1;
             self.held[index] = if taken { 0 } else { self.held[index].saturating_add(1) };
+            self.why_held[index] = self.why_held(index);
         }
-        self.came = 0;
-        failed
+        self.came = early;
+        (self.why, self.lost) = ([None; READS], None);
     }
 
     /// Angles, speeds and wrench after the last [`Sensors::read`].
@@ -199,11 +225,15 @@ impl Sensors {
         for &index in &self.registers {
             let held = self.held[index];
             if held > 0 {
-                let detector = self.why_held(index);
+                let detector = self.why_held[index];
                 let stop = if detector == Detector::ForceSlew { State::Hold } else { State::Stop };
                 let demand = if held > limits.max_held_jobs { stop } else { State::Degraded };
                 findings.report(detector, demand, index as f64);
             }
+        }
+        if self.late_jobs > 0 {
+            let demand = if self.late_jobs > limits.max_held_jobs { State::Hold } else { State::Degraded };
+            findings.report(Detector::MessageAge, demand, self.late_jobs.into());
         }
         if self.old_force_jobs > 0 {
             let demand = if self.old_force_jobs > limits.max_old_force_jobs { State::Stop } else { State::Hold };
@@ -241,7 +271,8 @@ impl Sensors {
         match 1 << index & FORCE_WORDS != 0 && invalid != 0 {
             true if invalid & !u32::from(force::ERROR_SATURATED) == 0 => Detector::ForceFullScale,
             true => Detector::ForceErrorWord,
-            false => Detector::BusError,
+            // without a failed access the cards have answered, and a message is missing
+            false => self.why[index].or(self.lost).unwrap_or(Detector::Sequence),
         }
     }
 
@@ -333,6 +364,11 @@ impl Sensors {
     }
 }
 
+/// Whether job `a` comes before job `b`.
+fn is_older(a: u32, b: u32) -> bool {
+    (a.wrapping_sub(b) as i32) < 0
+}
+
 /// Counts how often in a row something was so.
 fn count(times: &mut u32, again: bool) {
     *times = if again { times.saturating_add(1) } else { 0 };
@@ -387,7 +423,7 @@ mod tests {
             let way = if job < 50 { 700_000 } else { -1_400_000 };
             counts = counts.map(|count| count + way);
             give(&mut sensors, job, counts, 1000);
-            assert_eq!(sensors.read(job, 5e-3), None);
+            sensors.read(job, 5e-3);
             for (joint, &count) in counts.iter().enumerate() {
                 let q = count as f64 / sensors.counts_per_rad[joint];
                 assert_eq!(sensors.sensed().q[joint], q);
@@ -417,7 +453,8 @@ mod tests {
         let mut sensors = all(&scenario(&[]));
         let counts = sensors.counts;
         give(&mut sensors, 0, counts.map(|c| c + 10), 0);
-        assert_eq!((sensors.read(0, 5e-3), demanded(&sensors).0), (None, State::Run));
+        sensors.read(0, 5e-3);
+        assert_eq!(demanded(&sensors).0, State::Run);
         let before = *sensors.sensed();
         for job in 1..=3 {
             for index in (0..READS).filter(|&index| index != COUNTS + 4) {
@@ -425,17 +462,37 @@ mod tests {
                 let value = if is_count { (counts[index / 2] + 10) as u32 } else { 0 };
                 sensors.take(&word(job, index, value, 0));
             }
-            // only the first miss in a row is news
-            let failed = sensors.read(job, 5e-3);
-            assert_eq!(failed, (job == 1).then_some(COUNTS + 4));
-            assert_eq!(demanded(&sensors), (State::Degraded, Some(Detector::BusError)));
+            let why = [Detector::BusError, Detector::AccessTimer, Detector::Sequence][job as usize - 1];
+            if why != Detector::Sequence {
+                sensors.failed(COUNTS as u16 + 4, why);
+            }
+            sensors.read(job, 5e-3);
+            assert_eq!(demanded(&sensors), (State::Degraded, Some(why)));
             assert_eq!(sensors.sensed().q[2], before.q[2]);
         }
         give(&mut sensors, 5, counts, 0);
         sensors.read(4, 5e-3);
         assert_eq!(demanded(&sensors).0, State::Stop, "nothing came in job 4");
-        give(&mut sensors, 6, counts, 0);
-        assert_eq!((sensors.read(6, 5e-3), demanded(&sensors).0), (None, State::Run));
+        sensors.read(5, 5e-3);
+        assert_eq!(demanded(&sensors).0, State::Run, "they were early");
+    }
+
+    #[test]
+    fn words_that_come_a_job_late_are_used_and_hold_the_arm_when_it_goes_on() {
+        let mut sensors = all(&scenario(&[]));
+        let counts = sensors.counts;
+        for job in 0..6 {
+            // those of the job before, and one of the job before that
+            give(&mut sensors, job, counts.map(|count| count + i64::from(job)), 0);
+            sensors.take(&word(job.wrapping_sub(1), COUNTS, 0, 0));
+            sensors.read(job + 1, 5e-3);
+            let state = if job < 3 { State::Degraded } else { State::Hold };
+            assert_eq!(demanded(&sensors), (state, Some(Detector::MessageAge)), "{job}");
+            assert_eq!(sensors.counts, counts.map(|count| count + i64::from(job)));
+        }
+        give(&mut sensors, 7, counts, 0);
+        sensors.read(7, 5e-3);
+        assert_eq!(demanded(&sensors).0, State::Run);
     }
 
     #[test]
@@ -489,7 +546,7 @@ mod tests {
         jumped[2] += (3e-3 * sensors.counts_per_rad[2]) as i64;
         for job in 1..=4 {
             give(&mut sensors, job, jumped, 0);
-            assert_eq!(sensors.read(job, 5e-3), None);
+            sensors.read(job, 5e-3);
             let state = if job == 4 { State::Stop } else { State::Degraded };
             assert_eq!(demanded(&sensors), (state, Some(Detector::EncoderJump)), "{job}");
             assert_eq!(sensors.sensed().q[2], before);

@@ -4,7 +4,7 @@
 //! for the retry. A window that is run again starts from the copy made at its start.
 
 use crate::cards::{Addresses, Cards, Damage};
-use board::{Board, Inputs, Ns, Outputs};
+use board::{Board, Inputs, Ns, Outputs, Told};
 use messages::{AmplifierCommand, BusWord, Event, EventKind, Severity, TransferRecord};
 use scenario::{FaultKind, Progress, Scenario, Schedule, Site, nanoseconds};
 
@@ -20,6 +20,7 @@ pub struct DaIo {
     state: State,
     /// State at the start of the last window, with what had arrived by then.
     saved: State,
+    told: Told,
 }
 
 #[derive(Debug)]
@@ -77,6 +78,7 @@ impl DaIo {
             schedule: Schedule::new(scenario, |site| matches!(site, Site::Converter(_) | Site::Power)),
             state: state(),
             saved: state(),
+            told: Told::default(),
         })
     }
 
@@ -151,6 +153,7 @@ impl Board for DaIo {
         if inputs.rerun {
             self.state.copy_from(&self.saved);
         }
+        self.told.tell(inputs.until, &inputs.defects, &mut out.mail.events);
         self.state.absorb(inputs);
         self.saved.copy_from(&self.state);
         if inputs.boot {

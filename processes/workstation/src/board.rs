@@ -5,9 +5,9 @@
 
 use crate::commands;
 use crate::sender::{Poll, Sender};
-use board::{Board, Inputs, Outputs};
+use board::{Board, Inputs, Outputs, Told};
 use messages::registers::mailbox;
-use messages::{BoardId, Command, Event, EventKind, Severity, Telemetry};
+use messages::{BoardId, Command, Detector, Event, EventKind, Severity, Telemetry, TransferRecord};
 use scenario::{FaultKind, Progress, Scenario, Schedule, Site};
 use vme::{Access, Direction, MILLISECOND, Ns, Op, Program, Width};
 
@@ -24,6 +24,9 @@ pub struct Workstation {
     progress: Progress,
     /// Its program has ended.
     gone: bool,
+    told: Told,
+    /// The last access did not get through the adaptor.
+    cut_off: bool,
     /// Epoch accepted last, as the state block of this job says.
     accepted: Option<u32>,
     /// Blocks that the last job wrote.
@@ -50,6 +53,8 @@ impl Workstation {
             schedule: Schedule::new(scenario, |site| site == Site::Board(BoardId::Workstation)),
             progress: Progress::default(),
             gone: false,
+            told: Told::default(),
+            cut_off: false,
             accepted: None,
             written: 0,
         })
@@ -96,6 +101,15 @@ impl Workstation {
         vec![self.block(Direction::Read, mailbox::TELEMETRY, size_of::<Telemetry>()), Op::Decide]
     }
 
+    /// An own access has failed. Where nothing on the other side has answered, the adaptor's link status says why.
+    fn failed(&mut self, transfer: &TransferRecord, out: &mut Outputs) {
+        if transfer.slave == u16::MAX && transfer.task == self.task && !std::mem::replace(&mut self.cut_off, true) {
+            let address = transfer.addr.into();
+            let event = Event::new(transfer.data_at, EventKind::Detected, Severity::Warn, address, 0.0);
+            out.mail.events.push(event.because(Some(Detector::LinkStatus)));
+        }
+    }
+
     fn decide(&mut self, now: Ns, out: &mut Outputs) {
         let stale = self.go_wrong(now, out);
         let accepted = self.accepted.take();
@@ -130,8 +144,13 @@ impl Board for Workstation {
             }
             out.programs.push((self.task, self.program()));
         }
+        self.told.tell(inputs.until, &inputs.defects, &mut out.mail.events);
+        for transfer in &inputs.transfers {
+            self.failed(transfer, out);
+        }
         if let Some(telemetry) = inputs.mail.telemetry.last() {
             self.accepted = Some(telemetry.epoch);
+            self.cut_off = false;
         }
         if inputs
             .decision

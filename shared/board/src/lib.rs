@@ -8,12 +8,14 @@
 
 mod mail;
 pub mod routes;
+mod told;
 
 pub use mail::Mail;
+pub use told::Told;
 pub use messages::BoardId;
 pub use vme::{Ns, Op, Program};
 
-use messages::TransferRecord;
+use messages::{Defect, TransferRecord};
 
 /// A board of the rack (or the arm, or a user's program in the place of one).
 pub trait Board: Send {
@@ -41,10 +43,12 @@ pub struct Inputs {
     pub finish: bool,
     /// A task of this board stands at its decision point at `until`.
     pub decision: Option<Decision>,
-    /// Bus transfers made *to* this board in the window, in the order of `data_at`.
+    /// Bus transfers made *to* this board in the window, and those of its own tasks that failed, in the order of `data_at`.
     pub transfers: Vec<TransferRecord>,
     /// What other boards sent since the last step.
     pub mail: Mail,
+    /// What was wrong with messages that came since the last step.
+    pub defects: Vec<Defect>,
 }
 
 /// A task at its decision point.

@@ -13,6 +13,13 @@ pub struct Route {
     pub to: &'static [BoardId],
 }
 
+impl Route {
+    /// Whether its messages travel over the bus: not on wires, nor to the record.
+    pub fn is_bus(&self) -> bool {
+        matches!(self.kind, Kind::Words | Kind::Commands | Kind::Telemetry)
+    }
+}
+
 use BoardId::*;
 
 /// All channels. Wires have no bus latency; register words move at the times that the timing plane gives.

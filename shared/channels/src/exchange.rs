@@ -1,8 +1,10 @@
 //! The mail of one process: what its boards send goes to the boards beside them and to other processes.
 
 use crate::domain::{DOWN_WORD, REBORN_WORD};
+use crate::frame::Frame;
 use crate::page::Page;
-use crate::{ChannelError, Domain, Port, Sender, wall_ns};
+use crate::tampered::Tampered;
+use crate::{ChannelError, Domain, Port, Sender, Tampering, wall_ns};
 use board::routes::{ROUTES, Route};
 use board::{BoardId, Mail};
 use messages::*;
@@ -24,6 +26,8 @@ pub struct Exchange {
     /// By index of their route.
     outlets: Vec<(usize, Box<dyn Outlet>)>,
     inlets: Vec<(usize, Box<dyn Inlet>)>,
+    /// Channels with planned faults, at their readers here.
+    tampered: Vec<Tampered>,
     /// How many messages each route has carried to other processes, and how many of them each inlet has seen: a look at
     /// the number is cheaper than one into an empty channel.
     tally: Option<Page>,
@@ -35,8 +39,8 @@ pub struct Exchange {
 }
 
 trait Outlet {
-    /// `stamped`: the header says when on the wall clock.
-    fn send(&mut self, mail: &Mail, stamped: bool) -> Result<(), ChannelError>;
+    /// Sends at simulated time `now`; `stamped`: the header says when on the wall clock.
+    fn send(&mut self, now: Ns, mail: &Mail, stamped: bool) -> Result<(), ChannelError>;
     /// Messages sent so far.
     fn sent(&self) -> u32;
     /// Messages need not reach these boards, a bit each, and only these.
@@ -52,10 +56,17 @@ trait Inlet {
         inboxes: &mut Inboxes,
         arrived: &mut dyn FnMut(&Header),
     ) -> Result<(), ChannelError>;
+    /// Takes up to so many sealed messages as they are.
+    fn receive_sealed(
+        &mut self,
+        messages: u32,
+        tampered: &mut Tampered,
+        arrived: &mut dyn FnMut(&Header),
+    ) -> Result<(), ChannelError>;
 }
 
 /// A kind of payload: where it lies in a [`Mail`].
-trait Payload: bytemuck::Pod + Debug {
+pub(crate) trait Payload: bytemuck::Pod + Debug {
     fn of(mail: &Mail) -> &[Self];
     fn of_mut(mail: &mut Mail) -> &mut Vec<Self>;
     fn newest(&self) -> u64;
@@ -69,8 +80,8 @@ macro_rules! payloads {
             fn newest(&self) -> u64 { self.$time }
         })*
 
-        fn open_outlet(kind: Kind, domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize, carried: u32) -> Result<Box<dyn Outlet>, ChannelError> {
-            Ok(match kind { $(Kind::$kind => Box::new(TypedOutlet::<$payload>::open(domain, name, readers, processes, carried)?),)* })
+        fn open_outlet(kind: Kind, domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize, carried: u32, sealed: bool) -> Result<Box<dyn Outlet>, ChannelError> {
+            Ok(match kind { $(Kind::$kind => Box::new(TypedOutlet::<$payload>::open(domain, name, readers, processes, carried, sealed)?),)* })
         }
 
         fn open_inlet(kind: Kind, domain: &Domain, name: &str, readers: Vec<BoardId>, processes: usize, carried: u32) -> Result<Box<dyn Inlet>, ChannelError> {
@@ -79,6 +90,19 @@ macro_rules! payloads {
 
         fn copy(kind: Kind, from: &Mail, to: &mut Mail) {
             match kind { $(Kind::$kind => to.$field.extend_from_slice(&from.$field),)* }
+        }
+
+        /// Hands each message that this mail makes to `take`, sealed.
+        pub(crate) fn seal(kind: Kind, mail: &Mail, header: &mut dyn FnMut() -> Header, take: &mut dyn FnMut(Frame)) {
+            match kind { $(Kind::$kind => mail.$field.chunks(LENGTH).for_each(|part| take(Frame::sealed(header(), part))),)* }
+        }
+
+        /// The elements of a message's payload, byte for byte.
+        pub(crate) fn append(kind: Kind, payload: &[u8], to: &mut Mail) {
+            match kind { $(Kind::$kind => {
+                let elements = payload.chunks_exact(size_of::<$payload>());
+                to.$field.extend(elements.map(bytemuck::pod_read_unaligned::<$payload>));
+            })* }
         }
     };
 }
@@ -101,6 +125,7 @@ struct TypedOutlet<T: Payload> {
     sender: Sender<T, Header>,
     seq: u32,
     readers: Vec<BoardId>,
+    sealed: bool,
 }
 
 impl<T: Payload> TypedOutlet<T> {
@@ -111,17 +136,22 @@ impl<T: Payload> TypedOutlet<T> {
         readers: Vec<BoardId>,
         processes: usize,
         carried: u32,
+        sealed: bool,
     ) -> Result<Self, ChannelError> {
-        Ok(TypedOutlet { sender: Sender::open(domain, name, processes, BUFFER, LENGTH)?, seq: carried, readers })
+        let sender = Sender::open(domain, name, processes, BUFFER, LENGTH)?;
+        Ok(TypedOutlet { sender, seq: carried, readers, sealed })
     }
 }
 
 impl<T: Payload> Outlet for TypedOutlet<T> {
-    fn send(&mut self, mail: &Mail, stamped: bool) -> Result<(), ChannelError> {
+    fn send(&mut self, now: Ns, mail: &Mail, stamped: bool) -> Result<(), ChannelError> {
         for payload in T::of(mail).chunks(LENGTH) {
-            let t = payload.last().map_or(0, Payload::newest);
-            self.sender
-                .send(&Header { t, seq: self.seq, crc: 0, wall_ns: if stamped { wall_ns() } else { 0 } }, payload)?;
+            let t = if self.sealed { now } else { payload.last().map_or(0, Payload::newest) };
+            let mut header = Header { t, seq: self.seq, crc: 0, wall_ns: if stamped { wall_ns() } else { 0 } };
+            if self.sealed {
+                header = Frame::sealed(header, payload).header;
+            }
+            self.sender.send(&header, payload)?;
             self.seq = self.seq.wrapping_add(1);
         }
         Ok(())
@@ -197,6 +227,25 @@ impl<T: Payload> Inlet for TypedInlet<T> {
             None => Ok(()),
         }
     }
+
+    fn receive_sealed(
+        &mut self,
+        messages: u32,
+        tampered: &mut Tampered,
+        arrived: &mut dyn FnMut(&Header),
+    ) -> Result<(), ChannelError> {
+        let mut take = |header: &Header, payload: &mut dyn Iterator<Item = &T>| {
+            arrived(header);
+            let payload = payload.flat_map(bytemuck::bytes_of).copied().collect();
+            tampered.take(Frame { header: *header, payload });
+        };
+        for _ in 0..messages {
+            if !self.port.receive(&mut take)? {
+                break;
+            }
+        }
+        Ok(())
+    }
 }
 
 fn two(inboxes: &mut Inboxes, a: usize, b: usize) -> (&Mail, &mut Mail) {
@@ -211,11 +260,12 @@ fn two(inboxes: &mut Inboxes, a: usize, b: usize) -> (&Mail, &mut Mail) {
 
 impl Exchange {
     /// The channels of a process that hosts the boards `here`; `process_of` gives every board's process by number.
-    /// Without a domain every board must be here.
+    /// Without a domain every board must be here. Channels over the bus that `tampering` touches are sealed and checked.
     pub fn open(
         here: &[BoardId],
         domain: Option<&Domain>,
         process_of: impl Fn(BoardId) -> usize,
+        tampering: &Tampering,
     ) -> Result<Exchange, ChannelError> {
         let mut exchange = Exchange { tally: domain.map(|domain| domain.tally.clone()), ..Exchange::default() };
         for (index, route) in ROUTES.iter().enumerate() {
@@ -228,14 +278,19 @@ impl Exchange {
             let name = format!("{}/{:?}", route.from.name(), route.kind).to_lowercase();
             // not 0 in a process that is started again
             let carried = domain.map_or(0, |domain| domain.tally.word(index).load(Ordering::SeqCst));
+            let sealed = route.is_bus() && tampering.touches(route.from);
+            if sealed && !readers.is_empty() {
+                exchange.tampered.push(Tampered::new(index, &readers, tampering));
+            }
             if here.contains(&route.from) {
                 if let (Some(domain), false) = (domain, processes.is_empty()) {
                     // one reader board stands for each process
                     let mut ends = away.clone();
                     ends.dedup_by_key(|board| process_of(*board));
-                    exchange.outlets.push((index, open_outlet(route.kind, domain, &name, ends, processes.len(), carried)?));
+                    let outlet = open_outlet(route.kind, domain, &name, ends, processes.len(), carried, sealed)?;
+                    exchange.outlets.push((index, outlet));
                 }
-                if !readers.is_empty() {
+                if !readers.is_empty() && !sealed {
                     exchange.local.push((*route, readers));
                 }
             } else if let (Some(domain), false) = (domain, readers.is_empty()) {
@@ -246,8 +301,8 @@ impl Exchange {
         Ok(exchange)
     }
 
-    /// Carries what `from` sent to the boards beside it and to other processes.
-    pub fn deliver(&mut self, from: BoardId, mail: &Mail, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
+    /// Carries what `from` sent at simulated time `now` to the boards beside it and to other processes.
+    pub fn deliver(&mut self, from: BoardId, now: Ns, mail: &Mail, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
         for (route, readers) in self.local.iter().filter(|(route, _)| route.from == from) {
             for reader in readers {
                 copy(route.kind, mail, &mut inboxes[*reader as usize]);
@@ -260,10 +315,13 @@ impl Exchange {
                 self.outlets.iter_mut().for_each(|(_, outlet)| outlet.expect_all_but(down));
             }
         }
+        for tampered in self.tampered.iter_mut().filter(|tampered| tampered.route().from == from) {
+            tampered.send(now, mail);
+        }
         let stamped = self.hops.is_some();
         for (route, outlet) in self.outlets.iter_mut().filter(|(route, _)| ROUTES[*route].from == from) {
             let before = outlet.sent();
-            outlet.send(mail, stamped)?;
+            outlet.send(now, mail, stamped)?;
             let sent = outlet.sent().wrapping_sub(before);
             if let Some(tally) = self.tally.as_ref().filter(|_| sent > 0) {
                 tally.word(*route).fetch_add(sent, Ordering::SeqCst);
@@ -275,7 +333,7 @@ impl Exchange {
     /// Takes in what other processes sent to `to`, which has acted up to `stepped_to`: where transport is measured, what
     /// is not newer than that has come late.
     pub fn fetch(&mut self, to: BoardId, stepped_to: Ns, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
-        let Self { inlets, hops, tally, seen, .. } = self;
+        let Self { inlets, hops, tally, seen, tampered, .. } = self;
         let inlets = inlets.iter_mut().zip(seen).filter(|((_, inlet), _)| inlet.readers().contains(&to));
         for ((route, inlet), seen) in inlets {
             let carried = tally.as_ref().map_or(0, |tally| tally.word(*route).load(Ordering::SeqCst));
@@ -287,7 +345,7 @@ impl Exchange {
             }
             // a sender that died may have sent one message that it has not counted
             let most = if reborn { u32::MAX } else { news };
-            let received = inlet.receive(most, inboxes, &mut |header| {
+            let mut arrived = |header: &Header| {
                 if let Some(hops) = hops {
                     hops.push(Span {
                         t: header.t,
@@ -300,13 +358,24 @@ impl Exchange {
                         ..Span::new(SpanKind::Hop, to)
                     });
                 }
-            });
+            };
+            let received = match tampered.iter_mut().find(|tampered| tampered.index() == *route) {
+                Some(tampered) => inlet.receive_sealed(most, tampered, &mut arrived),
+                None => inlet.receive(most, inboxes, &mut arrived),
+            };
             match received {
                 Err(ChannelError::Lost { .. }) if reborn => {}
                 received => received?,
             }
         }
         Ok(())
+    }
+
+    /// Hands `to` the messages with planned faults that have come to it by `now`, and what is wrong with them.
+    pub fn check(&mut self, to: BoardId, now: Ns, inboxes: &mut Inboxes, defects: &mut Vec<Defect>) {
+        for tampered in &mut self.tampered {
+            tampered.check(to, now, &mut inboxes[to as usize], defects);
+        }
     }
 
     /// From now on messages say when they were sent on the wall clock, and arrivals are measured.
@@ -342,9 +411,9 @@ mod tests {
 
     #[test]
     fn boards_in_one_process_need_no_domain() {
-        let mut exchange = Exchange::open(&BOARDS, None, |_| 0).expect("local");
+        let mut exchange = Exchange::open(&BOARDS, None, |_| 0, &Tampering::default()).expect("local");
         let mut inboxes = Inboxes::default();
-        exchange.deliver(DaIo, &mail_with_command(), &mut inboxes).expect("deliver");
+        exchange.deliver(DaIo, 9, &mail_with_command(), &mut inboxes).expect("deliver");
         assert_eq!(inboxes[HwSim as usize].amplifier, mail_with_command().amplifier);
         assert!(inboxes[EncoderIf as usize].amplifier.is_empty());
     }
@@ -357,18 +426,19 @@ mod tests {
         {
             let domain = Domain::join(folder.path(), &prefix, "a").expect("domain");
             let other = Domain::join(folder.path(), &prefix, "b").expect("domain");
-            let mut a = Exchange::open(&[DaIo, EncoderIf], Some(&domain), process_of).expect("open");
+            let mut a =
+                Exchange::open(&[DaIo, EncoderIf], Some(&domain), process_of, &Tampering::default()).expect("open");
             let here: Vec<BoardId> = BOARDS.into_iter().filter(|board| process_of(*board) == 0).collect();
-            let mut b = Exchange::open(&here, Some(&other), process_of).expect("open");
+            let mut b = Exchange::open(&here, Some(&other), process_of, &Tampering::default()).expect("open");
             let (mut at_a, mut at_b) = (Inboxes::default(), Inboxes::default());
-            a.deliver(DaIo, &mail_with_command(), &mut at_a).expect("deliver");
+            a.deliver(DaIo, 9, &mail_with_command(), &mut at_a).expect("deliver");
             b.fetch(HwSim, 0, &mut at_b).expect("fetch");
             assert_eq!(at_b[HwSim as usize].amplifier, mail_with_command().amplifier);
             assert_eq!(b.hops().count(), 0, "nothing is measured unasked");
             let mut mail = Mail::default();
             // one message more than fits a sample's preallocated length
             mail.plant.resize(LENGTH + 1, bytemuck::Zeroable::zeroed());
-            b.deliver(HwSim, &mail, &mut at_b).expect("deliver");
+            b.deliver(HwSim, 9, &mail, &mut at_b).expect("deliver");
             a.fetch(EncoderIf, 0, &mut at_a).expect("fetch");
             assert_eq!(at_a[EncoderIf as usize].plant.len(), LENGTH + 1);
             assert_eq!(at_a[DaIo as usize].plant.len(), LENGTH + 1);
@@ -384,15 +454,15 @@ mod tests {
         let process_of = |board: BoardId| usize::from(board == DaIo);
         {
             let domain = Domain::join(folder.path(), &prefix, "a").expect("domain");
-            let mut a = Exchange::open(&[DaIo], Some(&domain), process_of).expect("open");
-            let mut b = Exchange::open(&[HwSim], Some(&domain), process_of).expect("open");
+            let mut a = Exchange::open(&[DaIo], Some(&domain), process_of, &Tampering::default()).expect("open");
+            let mut b = Exchange::open(&[HwSim], Some(&domain), process_of, &Tampering::default()).expect("open");
             let mut inboxes = Inboxes::default();
             a.measure();
             b.measure();
             // the command is of time 7
             for (stepped_to, late, seq) in [(6, 0, 0), (7, 1, 1), (8, 1, 2)] {
                 let before = wall_ns();
-                a.deliver(DaIo, &mail_with_command(), &mut inboxes).expect("deliver");
+                a.deliver(DaIo, 9, &mail_with_command(), &mut inboxes).expect("deliver");
                 b.fetch(HwSim, stepped_to, &mut inboxes).expect("fetch");
                 let hops: Vec<Span> = b.hops().collect();
                 assert_eq!(hops.len(), 1);

@@ -35,11 +35,11 @@ pub enum Kind {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct Header {
-    /// Simulated time of the newest content, ns.
+    /// Simulated time of the newest content, ns; of a sealed message, when it was sent.
     pub t: u64,
     /// Number of this message in its channel, from 0.
     pub seq: u32,
-    /// CRC-32 over the header (this field 0, `wall_ns` 0) and the payload; 0 on wires and probes.
+    /// CRC-32 over payload, time and number of a sealed message; 0 where no fault is planned, and on wires and probes.
     pub crc: u32,
     /// CLOCK_MONOTONIC at sending, ns: for the transport ledger.
     pub wall_ns: u64,

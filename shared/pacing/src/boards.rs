@@ -4,6 +4,7 @@
 
 use crate::affinity::OneProcessor;
 use crate::error::at;
+use crate::faults::{Injections, tampering};
 use crate::host::{Answer, Factory, Host};
 use crate::life::Life;
 use crate::remote::{READY, Remote};
@@ -15,7 +16,7 @@ use messages::{BOARDS, Grant, NOBODY, Span, TransferRecord, flags};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use vme::{Log, Origin, Timing, Transfer};
+use vme::{Log, Origin, Status, Timing, Transfer};
 
 /// How often a wait looks whether everybody still lives.
 pub(crate) const WATCH_PERIOD: Duration = Duration::from_millis(50);
@@ -55,8 +56,10 @@ pub(crate) struct Boards<'f> {
     of_slave: Vec<BoardId>,
     /// Transfers made to each board in the window.
     pub transfers: [Vec<TransferRecord>; BOARDS.len()],
-    /// The scenario's numbers of the timing plane's faults.
-    pub faults: Vec<usize>,
+    /// The faults that the chassis tells of.
+    pub injections: Injections,
+    /// Number of the timing plane's faults; what comes behind them there are outages of boards.
+    pub timing_faults: usize,
     /// Number of the window.
     pub window: u64,
     /// Simulated time reached.
@@ -91,7 +94,7 @@ impl<'f> Boards<'f> {
         interrupted: &'static AtomicBool,
     ) -> Result<(Boards<'f>, Timing), RunError> {
         let scenario = context.scenario.clone();
-        let (fault_plan, faults) = scenario.fault_plan();
+        let (fault_plan, timing_faults) = scenario.fault_plan();
         let mut timing = Timing::with_faults(scenario.rack.clone(), fault_plan)?;
         let place = BOARDS.map(|board| if context.in_process { 0 } else { process_of(&scenario, board) });
         let away: Vec<usize> = (0..scenario.processes.len()).filter(|i| place.contains(&(i + 1))).collect();
@@ -114,7 +117,8 @@ impl<'f> Boards<'f> {
             domain = Some(joined);
             folder = Some(run_folder);
         }
-        let exchange = Exchange::open(&here, domain.as_ref(), |board| place[board as usize])?;
+        let exchange =
+            Exchange::open(&here, domain.as_ref(), |board| place[board as usize], &tampering(&scenario))?;
         let mut host = Host::new(&here, exchange, &context, factory)?;
         if context.measure {
             host.measure(false);
@@ -152,7 +156,8 @@ impl<'f> Boards<'f> {
             of_task: scenario.rack.tasks.iter().map(|task| board_named(&task.board)).collect(),
             of_slave: scenario.rack.slaves.iter().map(|slave| board_named(&slave.board)).collect(),
             transfers: Default::default(),
-            faults: faults.into_iter().map(|occurrence| occurrence.fault).collect(),
+            injections: Injections::new(&scenario),
+            timing_faults: timing_faults.len(),
             window: 0,
             reached: 0,
             spans,
@@ -275,12 +280,17 @@ impl<'f> Boards<'f> {
         }
     }
 
-    /// Sorts the transfers of a window by the board that they are made to.
+    /// Sorts the transfers of a window by the board that they are made to; those that failed go to the one that asked, too.
     pub fn sort_transfers(&mut self, log: &Log) {
         self.transfers.iter_mut().for_each(Vec::clear);
         for transfer in program_transfers(log) {
-            if let Some(slave) = transfer.slave {
-                self.transfers[self.of_slave[usize::from(slave)] as usize].push(transfer.into());
+            let to = transfer.slave.map(|slave| self.of_slave[usize::from(slave)]);
+            let asked = self.of_task[usize::from(transfer.task)];
+            if let Some(to) = to {
+                self.transfers[to as usize].push(transfer.into());
+            }
+            if transfer.status != Status::Ok && to != Some(asked) {
+                self.transfers[asked as usize].push(transfer.into());
             }
         }
     }

@@ -1,6 +1,7 @@
 //! The boards of one process and their mail.
 
 use crate::acts::Acts;
+use crate::faults::Clocks;
 use crate::holdback::take_before;
 use crate::{Context, RunError};
 use board::routes::ROUTES;
@@ -33,6 +34,7 @@ impl Answer {
 pub struct Host {
     boards: Vec<(BoardId, Box<dyn Board>)>,
     exchange: Exchange,
+    clocks: Clocks,
     inboxes: Box<Inboxes>,
     inputs: Inputs,
     outputs: Outputs,
@@ -57,7 +59,8 @@ impl Host {
             })
             .collect::<Result<_, _>>()?;
         let (inputs, outputs) = Default::default();
-        Ok(Host { boards, exchange, inboxes: Box::default(), inputs, outputs, measured: None })
+        let clocks = Clocks::new(&context.scenario);
+        Ok(Host { boards, exchange, clocks, inboxes: Box::default(), inputs, outputs, measured: None })
     }
 
     /// Drops these boards as a killed process drops them: nothing is flushed, nothing said.
@@ -80,14 +83,15 @@ impl Host {
     /// Takes in the mail of the board that the grant names and steps it.
     pub fn step(&mut self, grant: &Grant, transfers: &[TransferRecord]) -> Result<Answer, RunError> {
         if let Some(id) = BoardId::from_number(grant.board as u8) {
-            self.fetch(id, 0)?;
+            self.fetch(id, grant.until, 0)?;
         }
         self.act(grant, transfers)
     }
 
-    /// Takes in the mail of a board that has acted up to `stepped_to`.
-    pub(crate) fn fetch(&mut self, board: BoardId, stepped_to: Ns) -> Result<&mut Mail, RunError> {
+    /// Takes in the mail that a board that has acted up to `stepped_to` has at `now`.
+    pub(crate) fn fetch(&mut self, board: BoardId, now: Ns, stepped_to: Ns) -> Result<&mut Mail, RunError> {
         self.exchange.fetch(board, stepped_to, &mut self.inboxes)?;
+        self.exchange.check(board, now, &mut self.inboxes, &mut self.inputs.defects);
         if let Some((acts, true)) = &mut self.measured {
             for hop in self.exchange.hops() {
                 if ROUTES[hop.channel as usize].kind == Kind::Plant {
@@ -150,14 +154,20 @@ impl Host {
         let clock = |measured: &Option<(Acts, bool)>| if let Some((_, true)) = measured { wall_ns() } else { 0 };
         let begin = clock(&self.measured);
         if let Some((_, board)) = self.boards.iter_mut().find(|(known, _)| *known == id) {
-            board.step(grant.until, &self.inputs, &mut self.outputs);
+            board.step(self.clocks.show(id, grant.until), &self.inputs, &mut self.outputs);
         }
-        self.exchange.deliver(id, &self.outputs.mail, &mut self.inboxes)?;
+        if !self.clocks.are_right() {
+            // a card stamps by its own clock
+            let stamped = self.outputs.mail.words.iter_mut().filter(|word| word.t != 0);
+            stamped.for_each(|word| word.t = self.clocks.show(id, word.t));
+        }
+        self.exchange.deliver(id, grant.until, &self.outputs.mail, &mut self.inboxes)?;
         let end = clock(&self.measured);
         if let Some((acts, _)) = &mut self.measured {
             acts.stepped(id, grant, &self.inputs, &self.outputs, begin, end);
         }
         self.inputs.mail.clear();
+        self.inputs.defects.clear();
         Ok(Answer {
             early: self.outputs.early,
             rest: self.outputs.rest.take(),
@@ -167,7 +177,7 @@ impl Host {
 
     /// Sends mail in the chassis' own name.
     pub fn send(&mut self, mail: &Mail) -> Result<(), RunError> {
-        Ok(self.exchange.deliver(BoardId::Chassis, mail, &mut self.inboxes)?)
+        Ok(self.exchange.deliver(BoardId::Chassis, 0, mail, &mut self.inboxes)?)
     }
 
     /// Takes in the mail for the chassis itself.

@@ -16,6 +16,7 @@ mod acts;
 mod affinity;
 mod boards;
 mod error;
+mod faults;
 mod holdback;
 mod host;
 mod life;

@@ -184,17 +184,11 @@ impl<'f> Lockstep<'f> {
         self.own_mail.events.append(&mut self.boards.life.mail.events);
         let written = &self.boards.transfers[BoardId::DaIo as usize];
         self.boards.life.lines.transfers(written);
-        match stop {
-            Stop::Overrun { task, job } => {
-                self.ahead.halt(task);
-                let event = Event::new(until, EventKind::OverrunTrip, Severity::Error, job.into(), task.into());
-                self.own_mail.events.push(event);
-            }
-            Stop::Fault { fault } => {
-                let fault = self.boards.faults[usize::from(fault)] as f64;
-                self.own_mail.events.push(Event::new(until, EventKind::FaultInjected, Severity::Warn, fault, 0.0));
-            }
-            Stop::Limit | Stop::Decision { .. } => {}
+        self.boards.injections.tell(until, &mut self.own_mail.events);
+        if let Stop::Overrun { task, job } = stop {
+            self.ahead.halt(task);
+            let event = Event::new(until, EventKind::OverrunTrip, Severity::Error, job.into(), task.into());
+            self.own_mail.events.push(event);
         }
         observer.account(until, &self.log, &mut self.own_mail);
         self.record(from, until)?;
@@ -211,7 +205,7 @@ impl<'f> Lockstep<'f> {
         let mut stop = self.ahead.advance(limit, &mut self.log);
         // boards that are down have been told of, and this window began there
         while let Stop::Fault { fault } = stop
-            && usize::from(fault) >= self.boards.faults.len()
+            && usize::from(fault) >= self.boards.timing_faults
         {
             stop = self.ahead.advance(limit, &mut self.log);
         }

@@ -317,6 +317,7 @@ impl<'f> Realtime<'f> {
             let Some((window, Draft { from, until, log, trips, .. })) = self.told.pop_front() else { break };
             self.own_mail.clear();
             self.own_mail.events.append(&mut self.boards.life.mail.events);
+            self.boards.injections.tell(until, &mut self.own_mail.events);
             self.own_mail.transfers.extend(program_transfers(&log).map(TransferRecord::from));
             self.own_mail.events.extend(trips.iter().map(|(at, task, job)| {
                 let (job, task) = ((*job).into(), (*task).into());
@@ -327,7 +328,7 @@ impl<'f> Realtime<'f> {
             self.boards.transfers[BoardId::BusAnalyzer as usize].clear();
             let grant = Grant { window, ..self.boards.grant_of(BoardId::BusAnalyzer, from, until, 0) };
             self.grant(&grant)?;
-            let mail = self.boards.host.fetch(BoardId::Chassis, self.boards.reached)?;
+            let mail = self.boards.host.fetch(BoardId::Chassis, until, self.boards.reached)?;
             self.boards.reached = until;
             let flow = observer.window(until, mail, &log);
             mail.clear();

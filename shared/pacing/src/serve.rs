@@ -1,5 +1,6 @@
 //! The whole `main` of a process that hosts boards.
 
+use crate::faults::tampering;
 use crate::host::{Answer, Factory, Host};
 use crate::realtime::{self, Paced};
 use crate::remote::{Line, READY};
@@ -53,7 +54,8 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
     };
     let here: Vec<BoardId> = processes[index].boards.iter().filter_map(|board| BoardId::from_name(board)).collect();
     let domain = Domain::join(&folder.path, &folder.prefix, name)?;
-    let exchange = Exchange::open(&here, Some(&domain), |board| process_of(&context.scenario, board))?;
+    let place = |board| process_of(&context.scenario, board);
+    let exchange = Exchange::open(&here, Some(&domain), place, &tampering(&context.scenario))?;
     let mut line = Line::open(&domain, name, context.measure)?;
     let bells = Bells::open(&folder.path.join("bells"), processes.len() + 1)?;
     let mut bell = bells.bell(index + 1);

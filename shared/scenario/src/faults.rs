@@ -39,6 +39,8 @@ const SENDERS: [BoardId; 5] = [
     BoardId::ControlComputer,
     BoardId::Workstation,
 ];
+/// Boards whose clock shows: the control computer's, and those of the cards that stamp what it reads.
+const CLOCKS: [BoardId; 4] = [BoardId::DaIo, BoardId::ForceSensorIf, BoardId::EncoderIf, BoardId::ControlComputer];
 /// Boards that may crash: all but the arm, which is physics.
 const COMPUTERS: [BoardId; 6] = [
     BoardId::DaIo,
@@ -121,7 +123,8 @@ impl Scenario {
             DaStuck | DaOffset => Ok(Site::Converter(joint()?)),
             AmplifierTrip | BrakeSlip | BrakeStuck => Ok(Site::Drive(joint()?)),
             Delay | Jitter | Drop | Duplicate | Reorder | BitFlip => Ok(Site::Messages(board(&SENDERS)?)),
-            Crash | Hang | ClockDrift => Ok(Site::Board(board(&COMPUTERS)?)),
+            Crash | Hang => Ok(Site::Board(board(&COMPUTERS)?)),
+            ClockDrift => Ok(Site::Board(board(&CLOCKS)?)),
             Gone | StaleCommand | WrongCommand => only("workstation", Site::Board(BoardId::Workstation)),
             PowerFail => only("power", Site::Power),
             NoSlave => {
@@ -193,7 +196,16 @@ pub(crate) fn check(scenario: &Scenario) -> Result<(), Problem> {
         if let Some(least) = least.filter(|least| !(*least..=1e4).contains(&fault.amount)) {
             return refuse("amount", format!("is {}, expected {least} to 10 000", fault.amount));
         }
-        scenario.fault_site(i)?;
+        let range = match (fault.kind, scenario.fault_site(i)?) {
+            (FaultKind::Delay | FaultKind::Jitter, Site::Messages(_)) => Some((1e-3, 1e4)),
+            (FaultKind::Drop, _) => Some((0.0, 1.0)),
+            (FaultKind::BitFlip, _) => Some((1.0, 32.0)),
+            (FaultKind::ClockDrift, _) => Some((-1e5, 1e5)),
+            _ => None,
+        };
+        if let Some((least, most)) = range.filter(|(least, most)| !(*least..=*most).contains(&fault.amount)) {
+            return refuse("amount", format!("is {}, expected {least} to {most}", fault.amount));
+        }
         if occurrences(i, fault, scenario.seed, scenario.duration_ns()).len() >= MAX_OCCURRENCES {
             return refuse("every_s", format!("makes {MAX_OCCURRENCES} occurrences or more"));
         }

@@ -26,7 +26,7 @@ pub enum FaultKind {
     Starvation(u16),
     /// The bus grants nobody: access timer for all.
     StuckBus,
-    /// Events of this interrupter raise nothing.
+    /// Events of this interrupter raise nothing; after two in a row the handler's card polls.
     LostInterrupt(u16),
     /// The cable of this adaptor is out.
     CableOut(u16),

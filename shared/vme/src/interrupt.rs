@@ -72,6 +72,8 @@ pub struct Line {
     pub event: u32,
     /// Next tick of its own source.
     pub tick: u64,
+    /// Events in a row that got lost on the way.
+    pub missed: u32,
 }
 
 impl Line {

@@ -115,7 +115,10 @@ impl Rig {
             let addr = access.addr;
             // the control computer's own RAM is no card of the rig
             let own = Some(addr & !0xFFFF) == self.scenario.card_base("cpu-2-dpram");
-            if !own && !self.failing.contains(&addr) {
+            if self.failing.contains(&addr) {
+                let record = TransferRecord { data_at: now - 1000, addr, n: 1, job, task, index, ..bytemuck_zeroed() };
+                self.inputs.transfers.push(TransferRecord { width: 2, status: 1, ..record });
+            } else if !own {
                 let word = BusWord { t: now - 1000, addr, value: self.content(addr), job, task, index };
                 self.inputs.mail.words.push(word);
             }

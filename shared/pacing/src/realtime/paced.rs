@@ -91,7 +91,7 @@ impl Paced {
         let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
         let pace = &mut self.boards[board as usize];
         let began = wall_ns();
-        let mail = host.fetch(board, pace.stepped_to)?;
+        let mail = host.fetch(board, grant.until, pace.stepped_to)?;
         // answers to an earlier job that come with those of the next must not count as the newest
         mail.words.sort_unstable_by_key(|word| (word.job, word.task, word.index));
         let newest = mail.words.last().map_or(0, |word| word.job);

@@ -1,5 +1,7 @@
 //! Made-up runs of Table 5-3: a mass on an impedance with a constant force error, sampled like a rack's probes.
 
+#![allow(dead_code)] // each test file uses its part
+
 use bytemuck::Zeroable;
 use messages::{ControlProbe, PlantProbe};
 use report::{Ended, Ledger, Trace, VariantResult};

@@ -69,7 +69,7 @@ fault_kinds! {
     Saturation = "saturation";
     /// Force sensor: no samples come; the receiver's counter stands.
     Dropout = "dropout";
-    /// Force sensor: samples come `amount` ms late. Board: its messages do.
+    /// Force sensor: samples come `amount` ms late. Board: its messages over the bus do.
     Delay = "delay";
     /// Force sensor: the cable is open, samples read zero and the error word says that the sensor has changed. Joint: the
     /// encoder's lines are open, its count stands and its status says so.
@@ -95,13 +95,13 @@ fault_kinds! {
     BrakeStuck = "brake-stuck";
     /// Board: its messages come up to `amount` ms late, at random.
     Jitter = "jitter";
-    /// Board: its messages get lost.
+    /// Board: its messages get lost, each with probability `amount` (0: every one).
     Drop = "drop";
     /// Board: its messages come twice.
     Duplicate = "duplicate";
     /// Board: every second message comes after the one that follows it.
     Reorder = "reorder";
-    /// Board: `amount` bits of each message are flipped.
+    /// Board: `amount` bits of each of its messages are flipped.
     BitFlip = "bit-flip";
     /// Slave: it does not answer; accesses end in BERR*.
     NoSlave = "no-slave";
@@ -109,7 +109,7 @@ fault_kinds! {
     Starvation = "starvation";
     /// Bus: nobody is granted.
     StuckBus = "stuck-bus";
-    /// Interrupter: its events raise nothing.
+    /// Interrupter: its events raise nothing; after two in a row the handler's card goes on by polling.
     LostInterrupt = "lost-interrupt";
     /// Adaptor: its cable is out.
     CableOut = "cable-out";
@@ -121,7 +121,7 @@ fault_kinds! {
     Overrun = "overrun";
     /// Task: its execution times are multiplied by `amount`.
     Slow = "slow";
-    /// Board: its clock gains `amount` parts per million.
+    /// Interface card or control computer: its clock gains `amount` parts per million.
     ClockDrift = "clock-drift";
     /// Workstation: its program ends; no more polls, no more commands.
     Gone = "gone";

@@ -47,6 +47,10 @@ pub struct Safety {
     pub max_late_jobs: u32,
     /// Longest time that SS1 may take before the torque goes off (ms).
     pub stop_time_ms: f64,
+    /// Time that a message over the bus may be on its way (ms); checked where faults of messages are planned.
+    pub max_message_age_ms: f64,
+    /// How far the clocks of two boards may drift apart before they are set anew (µs).
+    pub max_clock_error_us: f64,
 }
 
 impl Default for Safety {
@@ -69,6 +73,8 @@ impl Default for Safety {
             max_command_speed_m_per_s: 1.0,
             max_late_jobs: 10,
             stop_time_ms: 200.0,
+            max_message_age_ms: 1.0,
+            max_clock_error_us: 200.0,
         }
     }
 }

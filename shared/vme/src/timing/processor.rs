@@ -9,6 +9,9 @@ use crate::program::{Access, Direction, Op, Origin, Status, Transfer};
 use crate::rack::Release;
 use crate::requester::{Client, Pending, ReleasePolicy};
 
+/// Ticks missed in a row after which a card goes on by polling.
+const MISSED_TICKS: u32 = 2;
+
 /// What a processor carries out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Strand {
@@ -301,11 +304,18 @@ impl Timing {
         }
     }
 
-    /// An event of an interrupter.
+    /// An event of an interrupter. Where its interrupts get lost, the handler's card misses its ticks, and after
+    /// [`MISSED_TICKS`] in a row looks for each by itself when it is due, which takes what serving an interrupt does.
     pub(super) fn raise(&mut self, i: u16) {
         if self.faults.holds(self.now, crate::FaultKind::LostInterrupt(i)).is_some() {
-            self.lines[i as usize].events = self.lines[i as usize].events.wrapping_add(1);
-            return;
+            let line = &mut self.lines[i as usize];
+            line.missed += 1;
+            if line.missed <= MISSED_TICKS {
+                line.events = line.events.wrapping_add(1);
+                return;
+            }
+        } else {
+            self.lines[i as usize].missed = 0;
         }
         if !self.lines[i as usize].raise(self.now) {
             self.counters.merged_interrupts += 1;

@@ -447,6 +447,21 @@ fn lost_interrupts_slow_tasks_and_halted_ones_show_in_their_jobs() {
 }
 
 #[test]
+fn a_card_that_misses_two_ticks_looks_for_the_next_ones_itself() {
+    let mut rack = rack(vec![task("reader", "cpu", 0, 100_000)]);
+    rack.tasks[0].release = Release::Interrupt("sample".into());
+    rack.interrupters.push(interrupter("sample", "ram", 5, Some(Ticks { period_ns: 100_000, offset_ns: 0 })));
+    let faults = vec![Fault { from_ns: 150_000, until_ns: 650_000, kind: FaultKind::LostInterrupt(0) }];
+    let mut timing = Timing::with_faults(rack, FaultPlan { faults }).unwrap();
+    timing.set_program(0, &[Op::Exec(1_000)]);
+    let mut log = Log::default();
+    while timing.now() < 1_000_000 {
+        timing.advance(1_000_000, &mut log);
+    }
+    assert_eq!(log.jobs.iter().map(|job| job.job).collect::<Vec<_>>(), [0, 1, 4, 5, 6, 7, 8, 9]);
+}
+
+#[test]
 fn round_robin_is_fair_among_levels_that_all_want_more_than_the_bus() {
     let mut rack = rack(vec![]);
     rack.bus.arbiter = Mode::Rrs;

@@ -50,7 +50,7 @@ fn a_sensor_that_repeats_itself_is_held_on_without_moving() {
 #[test]
 fn a_bus_that_grants_nobody_lets_the_output_watchdog_take_the_torque_off() {
     let row = row(fault("bus", "stuck-bus", &[]));
-    assert_eq!((row.reaction.as_str(), row.detected_by.as_str()), ("off (STO)", "output-watchdog"));
+    assert_eq!((row.reaction.as_str(), row.detected_by.as_str()), ("off (STO)", "access-timer"));
     assert!(row.after_ms < 20.0 + PERIOD_MS, "{row:?}");
 }
 

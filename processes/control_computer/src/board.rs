@@ -394,6 +394,13 @@ fn why_failed(transfer: &TransferRecord) -> Option<Detector> {
 
 impl Board for ControlComputer {
     fn step(&mut self, now: Ns, inputs: &Inputs, out: &mut Outputs) {
+        if inputs.boot && inputs.until > 0 {
+            // powered up again in the middle of a run
+            match &mut self.end {
+                End::Drives(output) => output.latch(inputs.until, out),
+                End::SecondCard { card, .. } => card.latch(inputs.until, out),
+            }
+        }
         if inputs.boot {
             out.programs.push((self.task, self.program.until_decision()));
             if let End::SecondCard { card, .. } = &self.end {

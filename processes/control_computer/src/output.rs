@@ -107,6 +107,14 @@ impl Output {
         state
     }
 
+    /// Begins in STO, latched, at `t`.
+    pub fn latch(&mut self, t: Ns, out: &mut Outputs) {
+        self.safety.latch();
+        let (from, to) = (f64::from(State::Run as u32), f64::from(State::Off as u32));
+        let event = Event::new(t, EventKind::SafetyState, Severity::Error, from, to);
+        out.mail.events.push(event.because(Some(Detector::Heartbeat)));
+    }
+
     /// What has been asked of the brakes.
     pub fn brakes(&self) -> Brakes {
         self.brakes

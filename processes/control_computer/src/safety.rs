@@ -39,6 +39,11 @@ impl Safety {
         Safety { stop_time: nanoseconds(limits.stop_time_ms * 1e-3), state: State::Run, since: 0 }
     }
 
+    /// Begins in STO, latched: a computer that is powered up again does not move the arm unasked.
+    pub fn latch(&mut self) {
+        self.state = State::Off;
+    }
+
     /// State now.
     pub fn state(&self) -> State {
         self.state

@@ -66,6 +66,11 @@ impl SecondCard {
         &mut self.ram
     }
 
+    /// Begins in STO, latched, at `t`.
+    pub fn latch(&mut self, t: Ns, out: &mut Outputs) {
+        self.output.latch(t, out);
+    }
+
     /// Its task.
     pub fn task(&self) -> u16 {
         self.task

@@ -538,14 +538,14 @@ mod tests {
     fn a_count_that_jumps_further_than_the_joint_can_turn_is_refused_until_the_arm_is_stopped() {
         let mut sensors = all(&scenario(&[]));
         let counts = sensors.counts;
-        give(&mut sensors, 0, counts, 0);
+        give(&mut sensors, 0, counts, 1_000);
         sensors.read(0, 5e-3);
         let before = sensors.sensed().q[2];
         // 3 mrad where the joint stands still
         let mut jumped = counts;
         jumped[2] += (3e-3 * sensors.counts_per_rad[2]) as i64;
         for job in 1..=4 {
-            give(&mut sensors, job, jumped, 0);
+            give(&mut sensors, job, jumped, 1_000);
             sensors.read(job, 5e-3);
             let state = if job == 4 { State::Stop } else { State::Degraded };
             assert_eq!(demanded(&sensors), (state, Some(Detector::EncoderJump)), "{job}");

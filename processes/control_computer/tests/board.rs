@@ -216,3 +216,19 @@ fn a_hold_drops_the_segments_and_keeps_the_tool_where_it_is() {
     rig.run();
     assert_eq!(state(&rig), 0);
 }
+
+#[test]
+fn a_computer_powered_up_again_in_the_middle_of_a_run_keeps_the_torque_off_until_acknowledged() {
+    let mut rig = Rig::new(table_5_3());
+    let boot = board::Inputs { boot: true, from: 1_000_000, until: 1_000_000, ..board::Inputs::default() };
+    rig.out.clear();
+    board::Board::step(&mut rig.board, 1_000_000, &boot, &mut rig.out);
+    let event = rig.events(EventKind::SafetyState)[0];
+    assert_eq!((event.b, event.cause), (4.0, messages::Detector::Heartbeat as u32));
+    rig.run();
+    assert_eq!(state(&rig), 4);
+    assert_eq!(rig.written(rig.address("parallel-io", parallel::ENABLE)), Some(0));
+    rig.command(command(1, CommandKind::Acknowledge), 0);
+    rig.run();
+    assert_eq!(state(&rig), 0);
+}

@@ -280,15 +280,16 @@ impl Exchange {
             let carried = domain.map_or(0, |domain| domain.tally.word(index).load(Ordering::SeqCst));
             let sealed = route.is_bus() && tampering.touches(route.from);
             if sealed && !readers.is_empty() {
-                exchange.tampered.push(Tampered::new(index, &readers, tampering));
+                exchange.tampered.push(Tampered::new(index, &readers, tampering, carried));
             }
             if here.contains(&route.from) {
                 if let (Some(domain), false) = (domain, processes.is_empty()) {
                     // one reader board stands for each process
                     let mut ends = away.clone();
                     ends.dedup_by_key(|board| process_of(*board));
-                    let outlet = open_outlet(route.kind, domain, &name, ends, processes.len(), carried, sealed)?;
-                    exchange.outlets.push((index, outlet));
+                    exchange
+                        .outlets
+                        .push((index, open_outlet(route.kind, domain, &name, ends, processes.len(), carried, sealed)?));
                 }
                 if !readers.is_empty() && !sealed {
                     exchange.local.push((*route, readers));
@@ -308,15 +309,15 @@ impl Exchange {
                 copy(route.kind, mail, &mut inboxes[*reader as usize]);
             }
         }
+        for tampered in self.tampered.iter_mut().filter(|tampered| tampered.route().from == from) {
+            tampered.send(now, mail);
+        }
         if let Some(tally) = &self.tally {
             let down = tally.word(DOWN_WORD).load(Ordering::SeqCst);
             if down != self.down {
                 self.down = down;
                 self.outlets.iter_mut().for_each(|(_, outlet)| outlet.expect_all_but(down));
             }
-        }
-        for tampered in self.tampered.iter_mut().filter(|tampered| tampered.route().from == from) {
-            tampered.send(now, mail);
         }
         let stamped = self.hops.is_some();
         for (route, outlet) in self.outlets.iter_mut().filter(|(route, _)| ROUTES[*route].from == from) {
@@ -376,6 +377,11 @@ impl Exchange {
         for tampered in &mut self.tampered {
             tampered.check(to, now, &mut inboxes[to as usize], defects);
         }
+    }
+
+    /// That board starts again: what was on its way to it is lost.
+    pub fn renew(&mut self, board: BoardId) {
+        self.tampered.iter_mut().for_each(|tampered| tampered.renew(board));
     }
 
     /// From now on messages say when they were sent on the wall clock, and arrivals are measured.

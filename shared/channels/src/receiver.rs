@@ -15,16 +15,22 @@ const WINDOW: u32 = 64;
 pub struct Receiver {
     from: BoardId,
     max_age: Ns,
-    /// Number expected next.
-    expected: u32,
+    /// Number expected next, where it is known.
+    expected: Option<u32>,
     /// Bit i: number `expected` − 1 − i has come.
     came: u64,
 }
 
 impl Receiver {
-    /// The end of a channel from that board, on which a message takes `max_age` at most.
-    pub fn new(from: BoardId, max_age: Ns) -> Receiver {
-        Receiver { from, max_age, expected: 0, came: 0 }
+    /// The end of a channel from that board, on which a message takes `max_age` at most; without a number expected `first`,
+    /// the first that comes is right.
+    pub fn new(from: BoardId, max_age: Ns, first: Option<u32>) -> Receiver {
+        Receiver { from, max_age, expected: first, came: 0 }
+    }
+
+    /// Whatever number comes next is right.
+    pub fn renew(&mut self) {
+        self.expected = None;
     }
 
     /// Whether a message that was so long on its way is to be used; `found` hears what is wrong.
@@ -36,9 +42,10 @@ impl Receiver {
             tell(DefectKind::Corrupted, seq.into());
             return false;
         }
-        let ahead = seq.wrapping_sub(self.expected) as i32;
+        let expected = self.expected.unwrap_or(seq);
+        let ahead = seq.wrapping_sub(expected) as i32;
         if ahead < 0 {
-            let back = self.expected.wrapping_sub(1).wrapping_sub(seq);
+            let back = expected.wrapping_sub(1).wrapping_sub(seq);
             let again = back < WINDOW && self.came >> back & 1 == 1;
             tell(if again { DefectKind::Repeated } else { DefectKind::Overtaken }, seq.into());
             if back < WINDOW {
@@ -50,7 +57,7 @@ impl Receiver {
             tell(DefectKind::Gap, ahead.into());
         }
         self.came = self.came.checked_shl(ahead as u32 + 1).unwrap_or(0) | 1;
-        self.expected = seq.wrapping_add(1);
+        self.expected = Some(seq.wrapping_add(1));
         if on_its_way > self.max_age {
             tell(DefectKind::Late, on_its_way as f64 * 1e-6);
         }
@@ -66,7 +73,7 @@ mod tests {
     use rand_chacha::rand_core::{Rng, SeedableRng};
 
     fn receiver() -> Receiver {
-        Receiver::new(BoardId::EncoderIf, 1000)
+        Receiver::new(BoardId::EncoderIf, 1000, Some(0))
     }
 
     fn frame(seq: u32, words: u32) -> Frame {
@@ -106,8 +113,17 @@ mod tests {
     }
 
     #[test]
+    fn a_receiver_that_starts_again_takes_the_first_number_that_comes() {
+        let mut receiver = receiver();
+        assert_eq!(check(&mut receiver, 0, 0), (true, vec![]));
+        receiver.renew();
+        assert_eq!(check(&mut receiver, 9, 0), (true, vec![]));
+        assert_eq!(check(&mut receiver, 11, 0), (true, vec![(DefectKind::Gap, 1.0)]));
+    }
+
+    #[test]
     fn sequence_numbers_go_on_beyond_their_wrap() {
-        let mut receiver = Receiver { expected: u32::MAX, came: !0, ..receiver() };
+        let mut receiver = Receiver { expected: Some(u32::MAX), came: !0, ..receiver() };
         for seq in [u32::MAX, 0, 1] {
             assert_eq!(check(&mut receiver, seq, 0), (true, vec![]));
         }

@@ -11,6 +11,8 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// Random streams of faults of messages begin here.
 const STREAM: u64 = 1 << 34;
+/// Words of a stream that belong to one message: each bit to flip takes two.
+const WORDS: u128 = 128;
 
 /// The faults of messages of a run.
 #[derive(Clone, Debug, Default)]
@@ -93,12 +95,14 @@ impl Tampering {
 impl Way {
     /// A message is sent, at the time in its header.
     pub fn send(&mut self, mut frame: Frame) {
-        let sent = frame.header.t;
+        let (sent, seq) = (frame.header.t, frame.header.seq);
         let (mut late, mut lost, mut twice, mut swaps) = (None, false, false, false);
         for (fault, rng) in &mut self.faults {
             if !fault.holds.iter().any(|(from, until)| (*from..*until).contains(&sent)) {
                 continue;
             }
+            // so that no draw depends on how many messages the reader has seen
+            rng.set_word_pos(u128::from(seq) * WORDS);
             // in (0, 1]
             let mut uniform = || ((rng.next_u64() >> 11) + 1) as f64 / (1_u64 << 53) as f64;
             match fault.kind {
@@ -134,6 +138,12 @@ impl Way {
                 }
             }
         }
+    }
+
+    /// Everything on its way is lost.
+    pub fn clear(&mut self) {
+        self.overtaken = None;
+        self.underway.clear();
     }
 
     fn put(&mut self, message: Underway) {

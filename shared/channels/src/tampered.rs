@@ -19,11 +19,12 @@ pub(crate) struct Tampered {
 }
 
 impl Tampered {
-    /// The route of that index to these readers.
-    pub fn new(index: usize, readers: &[BoardId], tampering: &Tampering) -> Tampered {
+    /// The route of that index to these readers, which has carried so many messages before.
+    pub fn new(index: usize, readers: &[BoardId], tampering: &Tampering, carried: u32) -> Tampered {
         let from = ROUTES[index].from;
-        let end = |to: &BoardId| (*to, tampering.way(from, *to), Receiver::new(from, tampering.max_age));
-        Tampered { index, seq: 0, ends: readers.iter().map(end).collect() }
+        let first = (carried == 0).then_some(0);
+        let end = |to: &BoardId| (*to, tampering.way(from, *to), Receiver::new(from, tampering.max_age, first));
+        Tampered { index, seq: carried, ends: readers.iter().map(end).collect() }
     }
 
     /// Index of its route.
@@ -52,6 +53,14 @@ impl Tampered {
     /// A sealed message of another process.
     pub fn take(&mut self, frame: Frame) {
         self.ends.iter_mut().for_each(|(_, way, _)| way.send(frame.clone()));
+    }
+
+    /// A reader starts again.
+    pub fn renew(&mut self, reader: BoardId) {
+        for (_, way, receiver) in self.ends.iter_mut().filter(|(to, ..)| *to == reader) {
+            way.clear();
+            receiver.renew();
+        }
     }
 
     /// What has come to a reader by `now`.

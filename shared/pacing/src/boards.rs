@@ -58,7 +58,7 @@ pub(crate) struct Boards<'f> {
     pub transfers: [Vec<TransferRecord>; BOARDS.len()],
     /// The faults that the chassis tells of.
     pub injections: Injections,
-    /// Number of the timing plane's faults; what comes behind them there are outages of boards.
+    /// Planned faults of bus and processors; those behind them in the timing plane are boards that are down.
     pub timing_faults: usize,
     /// Number of the window.
     pub window: u64,

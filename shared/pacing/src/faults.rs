@@ -86,7 +86,7 @@ impl Clocks {
     /// What the board's clock shows at simulated time `t`.
     pub fn show(&self, board: BoardId, t: Ns) -> Ns {
         let of_board = self.drifts.iter().filter(|(drifting, from, ..)| *drifting == board && *from < t);
-        let gained: i64 = of_board.map(|(_, from, until, gain)| ((t.min(*until) - from) as f64 * gain) as i64).sum();
+        let gained: i64 = of_board.map(|(_, from, until, gain)| ((t.min(*until) - from) as f64 * gain).round() as i64).sum();
         t.saturating_add_signed(gained)
     }
 

@@ -75,6 +75,7 @@ impl Host {
         for id in up {
             let board = factory(*id, context).map_err(|reason| RunError::Board { board: id.name(), reason })?;
             self.inboxes[*id as usize].clear();
+            self.exchange.renew(*id);
             self.boards.push((*id, board));
         }
         Ok(())

@@ -21,6 +21,8 @@ pub(crate) fn check(scenario: &Scenario) -> Result {
     let safety = &scenario.safety;
     for (key, value, most) in [
         ("max_force_age_ms", safety.max_force_age_ms, 1e4),
+        ("max_message_age_ms", safety.max_message_age_ms, 1e4),
+        ("max_clock_error_us", safety.max_clock_error_us, 1e6),
         ("max_force_slew_n", safety.max_force_slew_n, 1e6),
         ("max_force_noise_n", safety.max_force_noise_n, 1e6),
         ("max_free_force_n", safety.max_free_force_n, 1e6),

@@ -88,6 +88,7 @@ fn a_command_counts_from_its_transfer_on_and_is_judged_once() {
     rig.run();
     let refused = rig.events(EventKind::CommandRefused);
     assert_eq!((refused.len(), refused[0].a, refused[0].b), (1, 1.0, 2.0));
+    assert_eq!(state(&rig), 2, "whoever repeats an old command may not go on commanding");
 
     let mut bad = command(2, CommandKind::Segment);
     bad.mass[0] = 0.0;

@@ -75,6 +75,17 @@ fn a_dropout_stops_samples_and_counter_and_both_come_back() {
 }
 
 #[test]
+fn samples_that_come_late_are_the_ones_of_then_and_the_counter_says_so() {
+    let mut bench = bench(FaultKind::Delay, 4.0);
+    // 100 N/s: 4 ms late is 0.4 N short
+    assert!(error(&mut bench, 10 * MS - 1).abs() < 0.2);
+    assert!((error(&mut bench, 18 * MS) + 0.4).abs() < LSB);
+    assert_eq!(bench.read(18 * MS, force::counter(0)), (18 - 4) * 8);
+    assert_eq!(bench.read(20 * MS, force::counter(0)), 20 * 8);
+    assert!(error(&mut bench, 20 * MS).abs() < LSB);
+}
+
+#[test]
 fn a_spike_is_one_sample() {
     let mut bench = bench(FaultKind::Spike, 30.0);
     assert!((error(&mut bench, 10 * MS) - 30.0).abs() < LSB);

@@ -192,3 +192,57 @@ fn a_rack_without_a_console_task_or_a_mailbox_is_refused() {
         .retain(|task| task.board != "workstation");
     assert!(Workstation::new(&scenario).is_err_and(|message| message.contains("workstation")));
 }
+
+/// Table 5-3 with a fault of the workstation from 1.55 s on.
+fn faulty(kind: &str, more: &str) -> Scenario {
+    let fault = format!("fault=[{{ target='workstation', kind='{kind}', start_s=1.55, {more} }}]");
+    scenario::load("table-5-3", &[fault]).unwrap().scenario().unwrap()
+}
+
+/// When each fault is told to have begun.
+fn injected(jobs: &[Job]) -> Vec<Ns> {
+    let told = |job: &&Job| job.events.contains(&(EventKind::FaultInjected as u32, 0.0));
+    jobs.iter().filter(told).map(|job| job.t).collect()
+}
+
+#[test]
+fn a_program_that_ends_polls_and_sends_no_more_until_it_runs_again() {
+    let scenario = faulty("gone", "duration_s=5.0");
+    let mut board = Workstation::new(&scenario).unwrap();
+    let task = scenario.task_of("workstation").unwrap();
+    let (mut inputs, mut out) = (Inputs::default(), Outputs::default());
+    let mut programs = Vec::new();
+    for job in 0..80 {
+        inputs.until = u64::from(job) * PERIOD + 5_000;
+        inputs.decision = Some(board::Decision { task, job });
+        out.clear();
+        board.step(inputs.until, &inputs, &mut out);
+        let gone = (16..66).contains(&job);
+        assert!(!gone || out.mail.commands.is_empty());
+        programs.extend(out.programs.iter().map(|(_, program)| (job, program.len())));
+    }
+    // a decision without a read, then both again
+    assert_eq!(programs, [(16, 1), (66, 2)]);
+}
+
+#[test]
+fn a_stale_command_repeats_the_newest_one_under_its_old_epoch() {
+    let jobs = run(&faulty("stale-command", ""), |_| true);
+    assert_eq!(injected(&jobs), [16 * PERIOD + 5_000]);
+    let before = jobs[..16].iter().flat_map(|job| &job.commands).next_back().unwrap();
+    assert_eq!(jobs[16].commands, [*before]);
+    assert_eq!(jobs[16].rest.len(), 1, "with a block write of its own");
+}
+
+#[test]
+fn a_wrong_command_asks_for_a_jump_under_the_next_epoch_and_the_others_count_on() {
+    let scenario = faulty("wrong-command", "amount=0.5");
+    let jobs = run(&scenario, |_| true);
+    let sent: Vec<&Command> = jobs.iter().flat_map(|job| &job.commands).collect();
+    let epochs: Vec<u32> = sent.iter().map(|command| command.epoch).collect();
+    assert_eq!(epochs, (1..=scenario.segments.len() as u32 + 1).collect::<Vec<_>>());
+    let wrong = jobs[16].commands[0];
+    let model = sent[wrong.epoch as usize - 2];
+    assert_eq!(wrong.position[2] - model.position[2], 0.5);
+    assert_eq!((wrong.start, wrong.move_time), (16 * PERIOD + 5_000, 0));
+}

@@ -1,0 +1,63 @@
+//! Rows of injected faults, from made-up events.
+
+mod made_up;
+
+use made_up::{ledger, table_5_3, trace};
+use messages::{Detector, Event, EventKind, Severity};
+use report::{Ended, VariantResult};
+
+const MS: u64 = 1_000_000;
+
+fn event(ms: u64, kind: EventKind, a: f64, b: f64, cause: Option<Detector>) -> Event {
+    Event::new(ms * MS, kind, Severity::Warn, a, b).because(cause)
+}
+
+/// The result of a run of 13 s with these events and two faults stated.
+fn result(events: &[Event]) -> VariantResult {
+    let (variant, mut scenario) = table_5_3().swap_remove(0);
+    let faults = "fault=[{ target='force_sensor', kind='dropout', start_s=5.0 }, \
+                  { target='joint-2', kind='brake-slip', start_s=6.0 }]";
+    scenario.faults = scenario::load("table-5-3", &[faults.into()]).unwrap().scenario().unwrap().faults;
+    let mut trace = trace(&scenario, 0.0, 13.0);
+    trace.events = events.to_vec();
+    VariantResult::new(&scenario, &variant, &trace, &ledger(&scenario), Ended::Completed, 13.0).unwrap()
+}
+
+#[test]
+fn a_fault_is_credited_to_the_first_detector_in_its_time_and_to_the_gravest_state_that_stood_in_it() {
+    let result = result(&[
+        event(5000, EventKind::FaultInjected, 0.0, 0.0, None),
+        event(5001, EventKind::TorqueLimit, 1.0, 3.0, None),
+        event(5018, EventKind::Detected, 3.0, 0.0, Some(Detector::ForceAge)),
+        event(5018, EventKind::SafetyState, 0.0, 2.0, Some(Detector::ForceAge)),
+        event(5100, EventKind::SafetyState, 2.0, 4.0, Some(Detector::ForceAge)),
+        event(6000, EventKind::FaultInjected, 1.0, 0.0, None),
+        event(6040, EventKind::Detected, 1.0, 0.0, Some(Detector::BrakeMotion)),
+    ]);
+    let [age, slip] = &result.faults[..] else { panic!("{:?}", result.faults) };
+    assert_eq!((age.detected_by.as_deref(), age.reaction.as_str()), (Some("force-age"), "off (STO)"));
+    assert!((age.detected_after_s.unwrap() - 0.018).abs() < 1e-9);
+    assert!((age.stopping_after_s.unwrap() - 0.018).abs() < 1e-9);
+    // the arm was off already
+    assert_eq!((slip.detected_by.as_deref(), slip.reaction.as_str()), (Some("brake-motion"), "off (STO)"));
+    assert_eq!(slip.stopping_after_s, None);
+    assert!(age.peak_torque_share >= 0.0 && !result.findings.iter().any(|text| text.contains("was injected")));
+}
+
+#[test]
+fn cards_that_say_what_they_are_need_no_detector_beside_it() {
+    for (kind, name) in [(EventKind::WatchdogExpired, "output-watchdog"), (EventKind::AmplifierTrip, "amplifier-trip")]
+    {
+        let events = [event(5000, EventKind::FaultInjected, 0.0, 0.0, None), event(5020, kind, 0.0, 0.0, None)];
+        assert_eq!(result(&events).faults[0].detected_by.as_deref(), Some(name));
+    }
+}
+
+#[test]
+fn a_detector_that_fires_before_anything_was_injected_is_a_finding() {
+    let trip = event(1250, EventKind::Detected, 0.0, 0.0, Some(Detector::EncoderJump));
+    let result = result(&[trip, event(5000, EventKind::FaultInjected, 0.0, 0.0, None)]);
+    let found = result.findings.iter().find(|text| text.contains("was injected"));
+    assert_eq!(found.map(String::as_str), Some("encoder-jump fired at 1.250 s: nothing was injected"));
+    assert_eq!(result.faults[0].detected_by, None);
+}

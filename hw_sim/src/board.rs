@@ -34,6 +34,8 @@ pub struct HwSim {
     commanded: Actuation,
     actuation: Actuation,
     faults: Faults,
+    /// A fault has begun or ended since the last actuation.
+    broken: bool,
     /// Forces in `state` under `actuation`, where `known`.
     now: Evaluation,
     known: bool,
@@ -61,6 +63,7 @@ impl HwSim {
             commanded: Actuation::SAFE,
             actuation: Actuation::SAFE,
             faults: Faults::new(scenario),
+            broken: false,
             now,
             known: true,
             pending: Vec::with_capacity(PENDING),
@@ -104,6 +107,10 @@ impl HwSim {
         if let Some(last) = self.pending[..due].last() {
             self.commanded = Actuation::from_command(last);
         }
+        let broken = std::mem::take(&mut self.broken);
+        if due == 0 && !broken {
+            return;
+        }
         let before = self.actuation;
         self.actuation = self.faults.spoil(self.commanded);
         if self.actuation != before {
@@ -122,9 +129,10 @@ impl HwSim {
     /// Lets the drives' faults begin and end that do so up to now.
     fn break_down(&mut self, out: &mut Outputs) {
         let changed = self.faults.advance(self.t, |fault, from| {
-            out.mail.events.push(Event::new(from, EventKind::FaultInjected, Severity::Warn, fault as f64, 0.0));
+            out.mail.events.push(Event::injected(from, fault));
         });
         if changed {
+            self.broken = true;
             self.status = self.switches();
         }
     }

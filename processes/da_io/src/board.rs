@@ -5,7 +5,7 @@
 
 use crate::cards::{Addresses, Cards, Damage};
 use board::{Board, Inputs, Ns, Outputs, Told};
-use messages::{AmplifierCommand, BusWord, Event, EventKind, Severity, TransferRecord};
+use messages::{AmplifierCommand, BusWord, Event, TransferRecord};
 use scenario::{FaultKind, Progress, Scenario, Schedule, Site, nanoseconds};
 
 /// Shortest time for which the supply holds after ACFAIL*, ms (VMEbus standard).
@@ -132,8 +132,7 @@ impl DaIo {
     fn break_down(&mut self, t: Ns, events: &mut Vec<Event>) {
         let Self { schedule, state, .. } = self;
         schedule.advance(&mut state.progress, t, |place, from| {
-            let number = schedule.entries()[place].number as f64;
-            events.push(Event::new(from, EventKind::FaultInjected, Severity::Warn, number, 0.0));
+            events.push(Event::injected(from, schedule.entries()[place].number));
         });
         let mut damage = Damage::default();
         for (_, entry) in schedule.holding(&state.progress) {

@@ -10,7 +10,7 @@ use crate::history::{History, counts_per_turn};
 use crate::velocity::{self, TIMER_NS};
 use board::{Board, Inputs, Outputs};
 use messages::registers::encoder;
-use messages::{BusWord, Event, EventKind, JOINTS, Severity, TransferRecord};
+use messages::{BusWord, Event, JOINTS, TransferRecord};
 use scenario::{Scenario, VelocitySource, nanoseconds};
 use vme::Ns;
 
@@ -136,7 +136,7 @@ impl EncoderIf {
         if self.channels.next_fault() <= t {
             self.follow(self.delayed(t));
             self.channels.advance(t, |fault, from| {
-                events.push(Event::new(from, EventKind::FaultInjected, Severity::Warn, fault as f64, 0.0));
+                events.push(Event::injected(from, fault));
             });
         }
     }

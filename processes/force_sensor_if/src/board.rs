@@ -99,7 +99,7 @@ impl ForceSensorIf {
                 return;
             };
             self.faults.advance(t, |fault, from| {
-                events.push(Event::new(from, EventKind::FaultInjected, Severity::Warn, fault as f64, 0.0));
+                events.push(Event::injected(from, fault));
             });
             if let Some(newest) = self.sampler.as_mut().filter(|_| self.faults.dropped()) {
                 newest.k = k;

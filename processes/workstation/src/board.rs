@@ -85,8 +85,7 @@ impl Workstation {
                 // whoever takes the console down tells of it
                 _ => return,
             }
-            let number = entry.number as f64;
-            out.mail.events.push(Event::new(now, EventKind::FaultInjected, Severity::Warn, number, 0.0));
+            out.mail.events.push(Event::injected(now, entry.number));
         });
         let gone = schedule.holding(progress).any(|(_, entry)| entry.fault.kind == FaultKind::Gone);
         if gone != self.gone {

@@ -201,7 +201,8 @@ impl<T: Payload> Inlet for TypedInlet<T> {
     ) -> Result<(), ChannelError> {
         let Self { port, expected, readers } = self;
         let mut gap = None;
-        let mut take = |header: &Header, payload: &mut dyn Iterator<Item = &T>| {
+        // an end that was opened late has missed the first ones
+        port.receive_up_to(messages, |header, payload| {
             arrived(header);
             if let Some(expected) = expected.filter(|expected| *expected != header.seq) {
                 gap = Some((expected, header.seq));
@@ -215,13 +216,7 @@ impl<T: Payload> Inlet for TypedInlet<T> {
                 let (from, to) = two(inboxes, first[0] as usize, *other as usize);
                 T::of_mut(to).extend_from_slice(&T::of(from)[start..]);
             }
-        };
-        for _ in 0..messages {
-            // an end that was opened late has missed the first ones
-            if !port.receive(&mut take)? {
-                break;
-            }
-        }
+        })?;
         match gap {
             Some((expected, found)) => Err(ChannelError::Lost { channel: port.name().to_owned(), expected, found }),
             None => Ok(()),
@@ -234,17 +229,11 @@ impl<T: Payload> Inlet for TypedInlet<T> {
         tampered: &mut Tampered,
         arrived: &mut dyn FnMut(&Header),
     ) -> Result<(), ChannelError> {
-        let mut take = |header: &Header, payload: &mut dyn Iterator<Item = &T>| {
+        self.port.receive_up_to(messages, |header, payload| {
             arrived(header);
             let payload = payload.flat_map(bytemuck::bytes_of).copied().collect();
             tampered.take(Frame { header: *header, payload });
-        };
-        for _ in 0..messages {
-            if !self.port.receive(&mut take)? {
-                break;
-            }
-        }
-        Ok(())
+        })
     }
 }
 

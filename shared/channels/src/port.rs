@@ -125,6 +125,20 @@ impl<T: Pod + Debug, H: Pod + Debug> Port<T, H> {
         }
     }
 
+    /// Takes up to so many messages; fewer where there are no more.
+    pub fn receive_up_to(
+        &self,
+        messages: u32,
+        mut take: impl FnMut(&H, &mut dyn Iterator<Item = &T>),
+    ) -> Result<(), ChannelError> {
+        for _ in 0..messages {
+            if !self.receive(&mut take)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// Name of the channel.
     pub fn name(&self) -> &str {
         &self.name

@@ -140,6 +140,11 @@ impl Event {
         Event { t, kind: kind as u32, severity: severity as u32, a, b, cause: 0, reserved: 0 }
     }
 
+    /// Fault number `fault` of the scenario begins at `t`.
+    pub fn injected(t: u64, fault: usize) -> Event {
+        Event::new(t, EventKind::FaultInjected, Severity::Warn, fault as f64, 0.0)
+    }
+
     /// The same event, because this detector fired.
     pub fn because(self, cause: Option<Detector>) -> Event {
         Event { cause: cause.map_or(0, |detector| detector as u32), ..self }

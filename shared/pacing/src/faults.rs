@@ -2,7 +2,7 @@
 
 use board::BoardId;
 use channels::{Tamper, TamperKind, Tampering};
-use messages::{Event, EventKind, Ns, Severity};
+use messages::{Event, Ns};
 use scenario::{Fault, FaultKind, Occurrence, Scenario, Site, nanoseconds};
 
 /// The planned faults of messages over the bus.
@@ -55,7 +55,7 @@ impl Injections {
     /// Tells of those that begin before `until` and have not been told of.
     pub fn tell(&mut self, until: Ns, events: &mut Vec<Event>) {
         while let Some((at, fault)) = self.begins.get(self.told).filter(|(at, _)| *at < until) {
-            events.push(Event::new(*at, EventKind::FaultInjected, Severity::Warn, *fault as f64, 0.0));
+            events.push(Event::injected(*at, *fault));
             self.told += 1;
         }
     }

@@ -154,7 +154,7 @@ impl Boards<'_> {
             let mail = &mut self.life.mail;
             self.life.lines.da_io_is_gone(now, outage.hang, &mut mail.amplifier, &mut mail.events);
         }
-        let event = Event::new(now, EventKind::FaultInjected, Severity::Warn, outage.fault as f64, 0.0);
+        let event = Event::injected(now, outage.fault);
         self.life.mail.events.push(event);
         if outage.until != Ns::MAX {
             self.life.returns.push((outage.until, outage.boards.clone(), true));

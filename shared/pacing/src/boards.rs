@@ -157,7 +157,7 @@ impl<'f> Boards<'f> {
             of_slave: scenario.rack.slaves.iter().map(|slave| board_named(&slave.board)).collect(),
             transfers: Default::default(),
             injections: Injections::new(&scenario),
-            timing_faults: timing_faults.len(),
+            timing_faults,
             window: 0,
             reached: 0,
             spans,

@@ -79,19 +79,18 @@ impl Scenario {
         self.faults.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The faults of bus and processors, [`Occurrence`]s beside them in the same order; then those of boards that are down.
-    pub fn fault_plan(&self) -> (vme::FaultPlan, Vec<Occurrence>) {
-        let (mut plan, mut known) = (vme::FaultPlan::default(), Vec::new());
-        for occurrence in self.occurrences() {
+    /// The faults that the timing plane has to know: first those of bus and processors, so many, then boards that are down.
+    pub fn fault_plan(&self) -> (vme::FaultPlan, usize) {
+        let mut plan = vme::FaultPlan::default();
+        for Occurrence { fault, from, until } in self.occurrences() {
             // a target that does not exist has been refused
-            if let Ok(Site::Timing(kind)) = self.fault_site(occurrence.fault) {
-                let Occurrence { from: from_ns, until: until_ns, .. } = occurrence;
-                plan.faults.push(vme::Fault { from_ns, until_ns, kind });
-                known.push(occurrence);
+            if let Ok(Site::Timing(kind)) = self.fault_site(fault) {
+                plan.faults.push(vme::Fault { from_ns: from, until_ns: until, kind });
             }
         }
+        let planned = plan.faults.len();
         plan.faults.extend(self.outage_faults());
-        (plan, known)
+        (plan, planned)
     }
 
     /// Where a fault acts. The problem names what its kind befalls.

@@ -387,22 +387,19 @@ impl<'f> Boards<'f> {
         while self.remotes[remote].reply(self.reached)?.is_some() {
             self.recorder_owes -= 1;
         }
-        while self.recorder_owes >= RECORDER_CREDIT {
-            if self.await_reply_or(remote, &|_| false)?.is_none() {
-                break;
-            }
-            self.recorder_owes -= 1;
-        }
-        Ok(())
+        self.await_recorder(RECORDER_CREDIT - 1)
     }
 
     /// Waits until the recorder has acted on all that it was granted.
     pub fn settle_recorder(&mut self) -> Result<(), RunError> {
         self.wake_recorder();
-        while let (Some(remote), true) = (self.place[BoardId::BusAnalyzer as usize], self.recorder_owes > 0) {
-            if self.await_reply_or(remote, &|_| false)?.is_none() {
-                break;
-            }
+        self.await_recorder(0)
+    }
+
+    /// Waits until the recorder owes so many answers at most, or has died and the run goes on without it.
+    fn await_recorder(&mut self, most: u32) -> Result<(), RunError> {
+        let Some(remote) = self.place[BoardId::BusAnalyzer as usize] else { return Ok(()) };
+        while self.recorder_owes > most && self.await_reply_or(remote, &|_| false)?.is_some() {
             self.recorder_owes -= 1;
         }
         Ok(())

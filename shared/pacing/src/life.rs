@@ -60,6 +60,12 @@ impl Life {
         self.down >> board as u32 & 1 == 1
     }
 
+    /// An event for each board that was lost at `now` although nobody planned it.
+    fn tell_lost(&mut self, now: Ns, boards: impl Iterator<Item = BoardId>) {
+        let lost = |board| Event::new(now, EventKind::BoardLost, Severity::Error, f64::from(board as u8), 0.0);
+        self.mail.events.extend(boards.map(lost));
+    }
+
     /// When a window has to end because boards go down or come up.
     pub fn next_change(&self) -> Ns {
         let returns = self.returns.iter().map(|(at, ..)| *at).min().unwrap_or(Ns::MAX);
@@ -101,11 +107,7 @@ impl Boards<'_> {
             let when = at(self.reached);
             self.life.losses.push(format!("process `{process}` {how}, {when}; the run went on without it"));
             let stated = self.context.scenario.processes.iter().filter(|stated| stated.name == *process);
-            for board in stated.flat_map(scenario::Process::board_ids) {
-                let number = f64::from(board as u8);
-                let event = Event::new(self.reached, EventKind::BoardLost, Severity::Error, number, 0.0);
-                self.life.mail.events.push(event);
-            }
+            self.life.tell_lost(self.reached, stated.flat_map(scenario::Process::board_ids));
         }
         !died.is_empty()
     }
@@ -170,10 +172,7 @@ impl Boards<'_> {
         self.life.losses.push(format!("process `{process}` {how}, {}; it is started again", at(now)));
         self.life.restarted.push(process.to_owned());
         self.tasks_of(&boards).into_iter().for_each(|task| timing.halt(task));
-        for board in &boards {
-            let event = Event::new(now, EventKind::BoardLost, Severity::Error, f64::from(*board as u8), 0.0);
-            self.life.mail.events.push(event);
-        }
+        self.life.tell_lost(now, boards.iter().copied());
         self.life.returns.push((up, boards, false));
     }
 

@@ -60,6 +60,8 @@ pub struct ControlComputer {
     hold: Option<Detector>,
     acknowledge: bool,
     segment: u32,
+    /// The last one that began.
+    begun: u32,
     target_limited: u32,
     torque_limited: u32,
     /// State blocks of the last two jobs: the older one shows until the newer is written.
@@ -124,6 +126,7 @@ impl ControlComputer {
             hold: None,
             acknowledge: false,
             segment: NO_SEGMENT,
+            begun: NO_SEGMENT,
             target_limited: 0,
             torque_limited: 0,
             telemetry: [nothing; 2],
@@ -250,14 +253,20 @@ impl ControlComputer {
         self.force_n = done.contact.fe.fixed_rows::<3>(0).norm();
         self.tell(t, &done, out);
         out.mail.control_probe.push(self.probe(t, job, state, &done));
+        let clear = match &mut self.end {
+            End::Drives(output) => output.is_clear(),
+            End::SecondCard { card, .. } => {
+                card.ram().read().clear && self.findings.demanded().0 <= State::Degraded
+            }
+        };
         self.telemetry = [
             self.telemetry[1],
             Telemetry {
                 t,
                 written,
                 epoch: self.epoch,
-                segment: self.segment,
-                state: state as u32,
+                segment: self.begun,
+                state: state as u32 | if clear { Telemetry::CLEAR } else { 0 },
                 heartbeat: job,
                 position: done.x.p.into(),
                 wrench: done.contact.fe.into(),
@@ -330,6 +339,7 @@ impl ControlComputer {
         if segment != self.segment && segment != NO_SEGMENT {
             let kind = EventKind::SegmentStart;
             out.mail.events.push(Event::new(t, kind, Severity::Ok, segment.into(), 0.0));
+            self.begun = segment;
         }
         self.segment = segment;
         if let Some(offset) = job.contact.tared {
@@ -395,7 +405,9 @@ fn why_failed(transfer: &TransferRecord) -> Option<Detector> {
 impl Board for ControlComputer {
     fn step(&mut self, now: Ns, inputs: &Inputs, out: &mut Outputs) {
         if inputs.boot && inputs.until > 0 {
-            // powered up again in the middle of a run
+            // powered up again in the middle of a run: the tool may touch
+            self.pipeline.skip_tare();
+            self.free = false;
             match &mut self.end {
                 End::Drives(output) => output.latch(inputs.until, out),
                 End::SecondCard { card, .. } => card.latch(inputs.until, out),

@@ -36,6 +36,8 @@ pub struct Word {
     pub state: State,
     /// Joints whose torque was cut, a bit each.
     pub torque_limited: u32,
+    /// The stop can be acknowledged.
+    pub clear: bool,
 }
 
 /// The second card's dual-ported RAM.
@@ -54,7 +56,7 @@ pub struct Ram {
 impl Ram {
     /// No block yet, running.
     pub fn new() -> Ram {
-        let word = Word { state: State::Run, torque_limited: 0 };
+        let word = Word { state: State::Run, torque_limited: 0, clear: false };
         Ram { posted: None, block: None, words: [(0, word); 2], read: word }
     }
 
@@ -126,10 +128,10 @@ mod tests {
     #[test]
     fn a_state_word_shows_from_the_instant_at_which_it_is_written() {
         let mut ram = Ram::new();
-        ram.show(1_000, Word { state: State::Off, torque_limited: 5 });
+        ram.show(1_000, Word { state: State::Off, torque_limited: 5, clear: true });
         ram.read_at(999);
         assert_eq!(ram.read().state, State::Run);
         ram.read_at(1_000);
-        assert_eq!(ram.read(), Word { state: State::Off, torque_limited: 5 });
+        assert_eq!(ram.read(), Word { state: State::Off, torque_limited: 5, clear: true });
     }
 }

@@ -47,6 +47,8 @@ pub struct Output {
     rest: Option<Rest>,
     brakes: Brakes,
     finite: bool,
+    /// The stop can be acknowledged.
+    clear: bool,
 }
 
 /// D/A converters: from torque to code.
@@ -74,6 +76,7 @@ impl Output {
             rest: None,
             brakes: Brakes::Engaged { since: 0 },
             finite: true,
+            clear: false,
         })
     }
 
@@ -95,6 +98,9 @@ impl Output {
         let before = self.safety.state();
         let (demand, cause) = findings.demanded();
         let state = self.safety.decide(now, demand, speed, acknowledge);
+        self.clear = self.safety.is_clear(demand, speed);
+        // only an acknowledgement leads out of a stop
+        let cause = if before >= State::Hold && state <= State::Degraded { Some(Detector::Operator) } else { cause };
         if state != before {
             let severity = match state {
                 State::Run => Severity::Ok,
@@ -113,6 +119,11 @@ impl Output {
         let (from, to) = (f64::from(State::Run as u32), f64::from(State::Off as u32));
         let event = Event::new(t, EventKind::SafetyState, Severity::Error, from, to);
         out.mail.events.push(event.because(Some(Detector::Heartbeat)));
+    }
+
+    /// Whether the last job's state is a stop that can be acknowledged.
+    pub fn is_clear(&self) -> bool {
+        self.clear
     }
 
     /// What has been asked of the brakes.
@@ -143,8 +154,9 @@ impl Output {
         };
         let rest = match self.rest {
             _ if mode == Mode::Free || !self.finite => Rest::Stop,
-            None | Some(Rest::Stop) => Rest::Start,
-            _ => Rest::Run,
+            None => Rest::Start,
+            Some(Rest::Stop) => Rest::Resume,
+            Some(_) => Rest::Run,
         };
         let codes: [u32; JOINTS] = std::array::from_fn(|joint| {
             let torque = if rest == Rest::Stop { 0.0 } else { torque[joint] };

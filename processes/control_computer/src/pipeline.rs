@@ -95,6 +95,11 @@ impl Pipeline {
         self.outer.law.trajectory()
     }
 
+    /// Takes no tare: the tool may touch, and the force at work is not the sensor's offset.
+    pub fn skip_tare(&mut self) {
+        self.outer.tool.skip_tare();
+    }
+
     /// Ends the segment in force and those that wait: X_d rests where the tool is.
     pub fn hold(&mut self, sensed: &Sensed) {
         let x = arm::forward_kinematics(&self.arm, &sensed.q);

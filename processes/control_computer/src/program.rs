@@ -1,8 +1,8 @@
 //! What the control tasks ask of the bus: their reads before the decision, their writes after it.
 //!
 //! A job reads every encoder, the force sensor and the drives' status one after the other, decides, computes, and writes
-//! the D/A converters and the output watchdog. The first job after a stop also switches the amplifiers on and releases the
-//! brakes; a job in STO does the opposite. One list per kind of job gives both the accesses and the words written, so the
+//! the D/A converters and the output watchdog. The first job also switches the amplifiers on and releases the brakes; one
+//! that leaves STO acknowledges the I/O card's own stop before that; a job in STO does the opposite. One list per kind of job gives both the accesses and the words written, so the
 //! two cannot differ.
 //!
 //! Where two cards share the pipeline, the first reads encoders, force sensor and the second card's state word, and writes
@@ -49,6 +49,8 @@ pub enum Part {
 pub enum Rest {
     /// Torques, with amplifiers switched on and brakes released.
     Start,
+    /// The same after a stop, which is acknowledged first.
+    Resume,
     /// Torques.
     Run,
     /// Amplifiers off, brakes on, no torque.
@@ -62,6 +64,7 @@ enum Write {
     Brake(u32),
     Code(usize),
     Heartbeat,
+    Acknowledge,
 }
 
 const ALL: u32 = (1 << JOINTS) - 1;
@@ -89,6 +92,15 @@ const START: [Write; JOINTS + 3] = {
     list[JOINTS + 2] = Write::Brake(ALL);
     list
 };
+const RESUME: [Write; JOINTS + 4] = {
+    let mut list = [Write::Acknowledge; JOINTS + 4];
+    let mut i = 0;
+    while i < START.len() {
+        list[i + 1] = START[i];
+        i += 1;
+    }
+    list
+};
 const RUN: [Write; JOINTS + 1] = around_codes([Write::Heartbeat; JOINTS + 1], 0);
 /// What takes the energy out comes first.
 const STOP: [Write; JOINTS + 3] = {
@@ -102,6 +114,7 @@ impl Rest {
     fn writes(self) -> &'static [Write] {
         match self {
             Rest::Start => &START,
+            Rest::Resume => &RESUME,
             Rest::Run => &RUN,
             Rest::Stop => &STOP,
         }
@@ -118,6 +131,7 @@ pub struct BusProgram {
     enable: Access,
     brake: Access,
     heartbeat: Access,
+    acknowledge: Access,
     entry_ns: u64,
     execution_ns: u64,
     /// First address of the telemetry block in this board's dual-ported RAM.
@@ -205,6 +219,7 @@ impl BusProgram {
             enable: register("parallel-io", parallel::ENABLE, Width::D32, write)?,
             brake: register("parallel-io", parallel::BRAKE, Width::D32, write)?,
             heartbeat: register("parallel-io", parallel::WATCHDOG, Width::D32, write)?,
+            acknowledge: register("parallel-io", parallel::WATCHDOG_STATUS, Width::D32, write)?,
             entry_ns: scenario::nanoseconds(entry_us * 1e-6),
             execution_ns: scenario::nanoseconds(execution_us * 1e-6),
             telemetry: ram + mailbox::TELEMETRY,
@@ -244,7 +259,7 @@ impl BusProgram {
     pub fn execution_ns(&self, rest: Rest) -> u64 {
         match rest {
             Rest::Stop => STOP_EXECUTION_NS,
-            Rest::Start | Rest::Run => self.execution_ns,
+            Rest::Start | Rest::Resume | Rest::Run => self.execution_ns,
         }
     }
 
@@ -258,6 +273,7 @@ impl BusProgram {
                     Write::Enable(bits) | Write::Brake(bits) => bits,
                     Write::Code(joint) => codes[joint],
                     Write::Heartbeat => job,
+                    Write::Acknowledge => parallel::ACKNOWLEDGE,
                 },
                 job,
                 task,
@@ -272,6 +288,7 @@ impl BusProgram {
             Write::Brake(_) => self.brake,
             Write::Code(joint) => self.codes[joint],
             Write::Heartbeat => self.heartbeat,
+            Write::Acknowledge => self.acknowledge,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The safety state machine: run, degraded, SS2 hold, SS1 stop, STO (stop categories of IEC 61800-5-2).
 //!
 //! Decided once a job, from what the job's [`crate::findings`] demand. Hold and STO latch until they are acknowledged with
-//! their cause gone. da_io has a stop of its own that does not trust this one.
+//! their cause gone and the arm at rest. da_io has a stop of its own that does not trust this one.
 
 use scenario::nanoseconds;
 use vme::Ns;
@@ -22,7 +22,7 @@ pub enum State {
     Off = 4,
 }
 
-/// Joint speed below which SS1 has done its work (rad/s).
+/// Joint speed below which the arm is at rest: SS1 has done its work, and a stop can be acknowledged (rad/s).
 const AT_REST: f64 = 5e-3;
 
 /// The state and how long it has lasted.
@@ -49,17 +49,22 @@ impl Safety {
         self.state
     }
 
+    /// Whether an acknowledgement would end the stop, under this demand and at this speed.
+    pub fn is_clear(&self, demand: State, speed: f64) -> bool {
+        matches!(self.state, State::Hold | State::Off) && demand <= State::Degraded && speed < AT_REST
+    }
+
     /// The state after a job at `now` whose findings demand `demand`, with the joints' greatest speed in rad/s.
     pub fn decide(&mut self, now: Ns, demand: State, speed: f64, acknowledge: bool) -> State {
         use State::*;
         let next = match (self.state, demand) {
             (_, Off) => Off,
-            (Off, Run | Degraded | Hold) if acknowledge => demand,
+            (Off | Hold, Run | Degraded) if acknowledge && speed < AT_REST => demand,
             (Off, _) => Off,
             (Stop, _) if speed < AT_REST || now >= self.since + self.stop_time => Off,
             (Stop, _) | (_, Stop) => Stop,
-            (Hold, _) if !acknowledge => Hold,
-            (Run | Degraded | Hold, _) => demand,
+            (Hold, _) => Hold,
+            (Run | Degraded, _) => demand,
         };
         if next != self.state {
             (self.state, self.since) = (next, now);
@@ -74,6 +79,7 @@ mod tests {
     use super::*;
 
     const MOVING: f64 = 1.0;
+    const RESTING: f64 = 1e-3;
 
     fn safety() -> Safety {
         Safety::new(&scenario::Safety::default())
@@ -86,9 +92,12 @@ mod tests {
             safety.decide(1, before, MOVING, false);
             assert_eq!(safety.decide(2, Off, MOVING, false), Off);
             assert_eq!(safety.decide(3, Run, MOVING, false), Off);
-            assert_eq!(safety.decide(4, Off, MOVING, true), Off);
-            assert_eq!(safety.decide(5, Stop, MOVING, true), Off);
-            assert_eq!(safety.decide(6, Run, MOVING, true), Run);
+            assert_eq!(safety.decide(4, Off, RESTING, true), Off);
+            assert_eq!(safety.decide(5, Stop, RESTING, true), Off);
+            assert_eq!(safety.decide(6, Run, MOVING, true), Off, "an arm that moves");
+            assert!(safety.is_clear(Run, RESTING) && !safety.is_clear(Run, MOVING) && !safety.is_clear(Hold, RESTING));
+            assert_eq!(safety.decide(7, Run, RESTING, true), Run);
+            assert!(!safety.is_clear(Run, RESTING), "nothing to acknowledge");
         }
     }
 
@@ -100,7 +109,7 @@ mod tests {
         assert_eq!(safety.decide(5, Stop, MOVING, false), Stop);
         assert_eq!(safety.decide(6, Run, MOVING, true), Stop);
         let mut slow = safety.clone();
-        assert_eq!(slow.decide(7, Run, 1e-3, false), Off);
+        assert_eq!(slow.decide(7, Run, RESTING, false), Off);
         assert_eq!(safety.decide(5 + 200_000_000, Run, MOVING, false), Off);
     }
 
@@ -109,9 +118,9 @@ mod tests {
         let mut safety = safety();
         assert_eq!(safety.decide(1, Hold, MOVING, false), Hold);
         assert_eq!(safety.decide(2, Run, MOVING, false), Hold);
-        assert_eq!(safety.decide(3, Hold, MOVING, true), Hold);
-        assert_eq!(safety.decide(4, Run, MOVING, true), Run);
+        assert_eq!(safety.decide(3, Hold, RESTING, true), Hold);
+        assert_eq!(safety.decide(4, Run, RESTING, true), Run);
         safety.decide(5, Hold, MOVING, false);
-        assert_eq!(safety.decide(6, Stop, MOVING, true), Stop);
+        assert_eq!(safety.decide(6, Stop, RESTING, true), Stop);
     }
 }

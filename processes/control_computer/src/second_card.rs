@@ -158,6 +158,6 @@ impl SecondCard {
         let torque = (mode != Mode::Free && self.output.carries(now)).then_some(self.torque);
         self.inverse.sent(&sensed.qd, torque);
         let written = self.output.write((self.task, job), (t, now), mode, &self.torque, &self.program, out);
-        self.ram.show(written, Word { state, torque_limited });
+        self.ram.show(written, Word { state, torque_limited, clear: self.output.is_clear() });
     }
 }

@@ -244,8 +244,12 @@ impl Sensors {
 
     /// Whether a joint cannot have turned by so many counts since its last count was taken.
     fn jumps(&self, joint: usize, turned: i64, period_s: f64) -> bool {
-        let limit = self.limits.max_count_jump_rad;
-        let expected = self.sensed.qd[joint] * period_s * f64::from(self.held[COUNTS + 2 * joint] + 1);
+        let (limit, at) = (self.limits.max_count_jump_rad, COUNTS + 2 * joint);
+        let expected = self.sensed.qd[joint] * period_s * f64::from(self.held[at] + 1);
+        // after a card that was silent for long nobody knows how far the joint went while it was stopped
+        if self.held[at] > self.limits.max_held_jobs && self.why_held[at] != Detector::EncoderJump {
+            return false;
+        }
         // where a joint stands when the power comes on is not known so well
         self.counts_at[joint] > 0 && limit > 0.0 && (turned as f64 / self.counts_per_rad[joint] - expected).abs() > limit
     }
@@ -482,6 +486,31 @@ mod tests {
             assert_eq!(demanded(&sensors), (state, Some(Detector::EncoderJump)), "{job}");
             assert_eq!(sensors.sensed().q[2], before);
         }
+    }
+
+    #[test]
+    fn a_count_that_comes_after_a_long_silence_is_taken_as_it_is_and_one_refused_before_never() {
+        let silent_for = |jobs: u32, refused: bool| {
+            let mut sensors = all(&scenario(&[]));
+            let counts = sensors.counts;
+            give(&mut sensors, 0, counts, 1_000);
+            sensors.read(0, 5e-3);
+            let mut jumped = counts;
+            jumped[2] += (3e-3 * sensors.counts_per_rad[2]) as i64;
+            for job in 1..=jobs {
+                if refused {
+                    give(&mut sensors, job, jumped, 1_000);
+                }
+                sensors.read(job, 5e-3);
+            }
+            give(&mut sensors, jobs + 1, jumped, 1_000);
+            sensors.read(jobs + 1, 5e-3);
+            demanded(&sensors).0
+        };
+        // the arm stops after 3 jobs without a count
+        assert_eq!(silent_for(3, false), State::Stop);
+        assert_eq!(silent_for(4, false), State::Run);
+        assert_eq!(silent_for(40, true), State::Stop, "the joint's zero is lost");
     }
 
     #[test]

@@ -70,6 +70,11 @@ impl ToolCompensation {
         }
     }
 
+    /// Takes no tare.
+    pub fn skip_tare(&mut self) {
+        self.tare.until = None;
+    }
+
     /// F_e from the wrench measured (sensor axes) with the tool at `x`, moving with `x_dot` (C), at `now`, `dt` seconds
     /// after the last call.
     pub fn contact(&mut self, measured: &Spatial, x: &Pose, x_dot: &Spatial, now: Ns, dt: f64) -> Contact {

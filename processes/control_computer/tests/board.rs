@@ -232,4 +232,10 @@ fn a_computer_powered_up_again_in_the_middle_of_a_run_keeps_the_torque_off_until
     rig.command(command(1, CommandKind::Acknowledge), 0);
     rig.run();
     assert_eq!(state(&rig), 0);
+    // the I/O card's own stop is acknowledged before anything else is written to it
+    let io = |offset| rig.written(rig.address("parallel-io", offset));
+    assert_eq!(io(parallel::WATCHDOG_STATUS), Some(parallel::ACKNOWLEDGE));
+    assert_eq!((io(parallel::ENABLE), io(parallel::BRAKE)), (Some(0x7F), Some(0x7F)));
+    rig.run();
+    assert_eq!(rig.written(rig.address("parallel-io", parallel::WATCHDOG_STATUS)), None, "once");
 }

@@ -2,13 +2,15 @@
 //!
 //! Each job reads the state block, decides, and writes a command block for every segment that starts within two polls
 //! and a margin. A state block that did not come (the bus or the link failed) leaves everything as it is until the next.
+//! What becomes of a stop of the arm, its [`Operator`] says.
 
 use crate::commands;
+use crate::operator::{Act, Operator};
 use crate::sender::{Poll, Sender};
 use board::{Board, Inputs, Outputs, Told};
 use messages::registers::mailbox;
 use messages::{BoardId, Command, Detector, Event, EventKind, Severity, Telemetry, TransferRecord};
-use scenario::{FaultKind, Progress, Scenario, Schedule, Site};
+use scenario::{FaultKind, Progress, Scenario, Schedule, Site, nanoseconds};
 use vme::{Access, Direction, MILLISECOND, Ns, Op, Program, Width};
 
 /// How much earlier than two polls ahead a command is sent.
@@ -17,9 +19,12 @@ const MARGIN: Ns = 50 * MILLISECOND;
 /// The workstation.
 pub struct Workstation {
     task: u16,
+    /// Time between two polls.
+    period: Ns,
     /// Address modifier and base of the control computer's dual-ported RAM.
     mailbox: (u8, u32),
     sender: Sender,
+    operator: Operator,
     schedule: Schedule,
     progress: Progress,
     /// Its program has ended.
@@ -27,8 +32,8 @@ pub struct Workstation {
     told: Told,
     /// The last access did not get through the adaptor.
     cut_off: bool,
-    /// Epoch accepted last, as the state block of this job says.
-    accepted: Option<u32>,
+    /// The state block of this job.
+    block: Option<Telemetry>,
     /// Blocks that the last job wrote.
     written: usize,
 }
@@ -50,12 +55,14 @@ impl Workstation {
             task,
             mailbox: (ram.am, ram.base),
             sender: Sender::new(commands::of(scenario), 2 * period + MARGIN),
+            operator: Operator::new(scenario.safety.acknowledge_s.map(nanoseconds)),
+            period,
             schedule: Schedule::new(scenario, |site| site == Site::Board(BoardId::Workstation)),
             progress: Progress::default(),
             gone: false,
             told: Told::default(),
             cut_off: false,
-            accepted: None,
+            block: None,
             written: 0,
         })
     }
@@ -109,10 +116,23 @@ impl Workstation {
         }
     }
 
+    /// What to send, by what the state block says.
+    fn poll(&mut self, now: Ns, block: Option<&Telemetry>) -> Poll {
+        let accepted = block.map(|block| block.epoch);
+        match (self.operator.look(now, block), accepted) {
+            (Act::Acknowledge, Some(accepted)) => self.sender.acknowledge(accepted),
+            // the first command is written before then
+            (Act::GoOn(segment), Some(accepted)) => self.sender.go_on_with(segment, now + self.period, accepted),
+            (Act::Wait, _) => return Poll::default(),
+            _ => {}
+        }
+        self.sender.poll(now, accepted)
+    }
+
     fn decide(&mut self, now: Ns, out: &mut Outputs) {
         let stale = self.go_wrong(now, out);
-        let accepted = self.accepted.take();
-        let poll = if self.gone { Poll::default() } else { self.sender.poll(now, accepted) };
+        let block = self.block.take();
+        let poll = if self.gone { Poll::default() } else { self.poll(now, block.as_ref()) };
         let (first, end) = poll.send;
         out.mail.commands.extend_from_slice(&self.sender.commands()[first..end]);
         out.mail.commands.extend(stale);
@@ -148,7 +168,7 @@ impl Board for Workstation {
             self.failed(transfer, out);
         }
         if let Some(telemetry) = inputs.mail.telemetry.last() {
-            self.accepted = Some(telemetry.epoch);
+            self.block = Some(*telemetry);
             self.cut_off = false;
         }
         if inputs

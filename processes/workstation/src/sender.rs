@@ -3,8 +3,11 @@
 //! A command is due when its segment starts within the horizon. The control computer's state block says which epoch was
 //! accepted last; what is still missing there after [`PATIENCE`] polls is sent again under the same epoch (the receiver
 //! knows a repetition by it). After [`SENDINGS`] times a command is given up and the next ones take their turn.
+//!
+//! After a stop nothing of what was sent counts any longer: commands then go on with the epoch behind the one accepted last,
+//! whoever accepted it.
 
-use messages::{Command, PathKind};
+use messages::{Command, CommandKind, PathKind};
 use vme::Ns;
 
 /// Polls that show a command as not accepted before it is sent again.
@@ -25,6 +28,8 @@ pub struct Poll {
 /// Progress through the commands.
 #[derive(Clone, Debug)]
 pub struct Sender {
+    /// One per segment of the task, as planned.
+    plan: Vec<Command>,
     commands: Vec<Command>,
     horizon: Ns,
     /// Commands that need no more care: accepted or given up.
@@ -41,6 +46,7 @@ impl Sender {
     /// Sends these commands, each when its segment starts within `horizon`.
     pub fn new(commands: Vec<Command>, horizon: Ns) -> Sender {
         Sender {
+            plan: commands.clone(),
             commands,
             horizon,
             settled: 0,
@@ -91,6 +97,33 @@ impl Sender {
         poll
     }
 
+    /// Acknowledges a stop, with the next poll; epoch `accepted` was accepted last.
+    pub fn acknowledge(&mut self, accepted: u32) {
+        let acknowledge = CommandKind::Acknowledge as u32;
+        let Some(model) = self.plan.first() else { return };
+        self.begin_anew(vec![Command { epoch: accepted + 1, kind: acknowledge, start: 0, ..*model }]);
+    }
+
+    /// Has the task go on with this segment from `start` on: it and those behind it last as long as planned.
+    pub fn go_on_with(&mut self, segment: u32, start: Ns, accepted: u32) {
+        let left = self.plan.iter().skip_while(|command| command.segment != segment);
+        let planned = left.clone().next().map_or(0, |first| first.start);
+        let moved = |t: Ns| t - planned + start;
+        let again = |(epoch, command): (u32, &Command)| Command {
+            epoch,
+            start: moved(command.start),
+            end: moved(command.end),
+            ..*command
+        };
+        let commands = (accepted + 1..).zip(left).map(again).collect();
+        self.begin_anew(commands);
+    }
+
+    fn begin_anew(&mut self, commands: Vec<Command>) {
+        self.commands = commands;
+        (self.settled, self.sent, self.polls, self.sendings) = (0, 0, 0, 0);
+    }
+
     /// The newest command sent so far.
     pub fn newest_sent(&self) -> Option<Command> {
         self.sent.checked_sub(1).map(|last| self.commands[last])
@@ -100,9 +133,13 @@ impl Sender {
     /// the newest segment sent put it. Those that follow it count on from it.
     pub fn interpose(&mut self, now: Ns, step: f64) {
         let Some(model) = self.newest_sent().or(self.commands.first().copied()) else { return };
-        let mut wrong = Command { path: PathKind::Step as u32, start: now, end: now + 1_000_000_000, move_time: 0, ..model };
+        let kind = CommandKind::Segment as u32;
+        let mut wrong = Command { kind, path: PathKind::Step as u32, start: now, end: now + 1_000_000_000, move_time: 0, ..model };
         wrong.position[2] += step;
-        wrong.epoch = self.sent as u32 + 1;
+        wrong.epoch = match self.commands.get(self.sent) {
+            Some(next) => next.epoch,
+            None => model.epoch + 1,
+        };
         self.commands.insert(self.sent, wrong);
         self.commands[self.sent + 1..].iter_mut().for_each(|command| command.epoch += 1);
     }
@@ -128,6 +165,25 @@ mod tests {
                 ..bytemuck::Zeroable::zeroed()
             })
             .collect()
+    }
+
+    #[test]
+    fn after_a_stop_the_epochs_go_on_behind_the_one_accepted_last_and_the_times_from_the_new_start() {
+        let mut plan = commands(&[0, 3, 7]);
+        (0..).zip(&mut plan).for_each(|(i, command)| {
+            (command.segment, command.end) = (i, command.start + 2 * SECOND);
+        });
+        let mut sender = Sender::new(plan, 2 * SECOND);
+        sender.poll(4 * SECOND, Some(0));
+        sender.acknowledge(2);
+        let Poll { send: (first, end), .. } = sender.poll(9 * SECOND, Some(2));
+        let sent: Vec<_> = sender.commands()[first..end].iter().map(|sent| (sent.epoch, sent.kind)).collect();
+        assert_eq!(sent, [(3, CommandKind::Acknowledge as u32)]);
+        sender.go_on_with(1, 10 * SECOND, 3);
+        let times: Vec<_> = sender.commands().iter().map(|again| (again.epoch, again.start, again.end)).collect();
+        assert_eq!(times, [(4, 10 * SECOND, 12 * SECOND), (5, 14 * SECOND, 16 * SECOND)]);
+        assert_eq!(sender.poll(9 * SECOND, Some(3)).send, (0, 1));
+        assert_eq!(sender.poll(12 * SECOND, Some(4)).send, (1, 2));
     }
 
     fn nothing() -> Poll {

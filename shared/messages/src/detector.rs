@@ -90,7 +90,7 @@ detectors! {
     NotFinite = 33 "not-finite";
     /// The hand-over block of the first of two cards is late.
     HandOver = 34 "hand-over";
-    /// Somebody at the workstation asks for a stop.
+    /// Somebody at the workstation asks for a stop, or acknowledges one.
     Operator = 35 "operator";
 }
 

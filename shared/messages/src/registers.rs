@@ -107,6 +107,6 @@ pub mod mailbox {
     /// Hand-over block in the second card's RAM, where the pipeline is split over two: written by the first card.
     pub const HANDOVER: u32 = 0x2000;
     /// State word in the second card's RAM, read by the first: safety state in the low byte, above it a bit for each joint
-    /// whose torque was cut.
+    /// whose torque was cut, and one for a stop that can be acknowledged.
     pub const STATE: u32 = 0x3000;
 }

@@ -12,9 +12,9 @@ pub struct Telemetry {
     pub written: u64,
     /// Epoch of the last command accepted.
     pub epoch: u32,
-    /// Index of the segment in force, `u32::MAX` before the first.
+    /// Index of the segment that began last, `u32::MAX` before the first; after a stop, the one that it interrupted.
     pub segment: u32,
-    /// Safety state: 0 run, 1 degraded, 2 SS2 hold, 3 SS1 stop, 4 STO.
+    /// Safety state in the low byte (0 run, 1 degraded, 2 SS2 hold, 3 SS1 stop, 4 STO), and [`Telemetry::CLEAR`].
     pub state: u32,
     /// Heartbeat: activation number of the control task.
     pub heartbeat: u32,
@@ -22,4 +22,19 @@ pub struct Telemetry {
     pub position: [f64; 3],
     /// Measured wrench in the task frame, N and Nm.
     pub wrench: [f64; 6],
+}
+
+impl Telemetry {
+    /// Bit of [`Telemetry::state`]: a hold or STO whose cause is gone, with the arm at rest. It can be acknowledged.
+    pub const CLEAR: u32 = 0x100;
+
+    /// Whether the arm is held or stopped, or being so.
+    pub fn is_stopped(&self) -> bool {
+        self.state & 0xFF >= 2
+    }
+
+    /// Whether an acknowledgement would end the stop.
+    pub fn is_clear(&self) -> bool {
+        self.state & Telemetry::CLEAR != 0
+    }
 }

@@ -37,6 +37,9 @@ pub(crate) fn check(scenario: &Scenario) -> Result {
     ] {
         within(&format!("safety.{key}"), value, 0.0..=most, &format!("0 to {most}"))?;
     }
+    if let Some(wait) = safety.acknowledge_s {
+        within("safety.acknowledge_s", wait, 0.0..=1e6, "0 to 1 000 000 s")?;
+    }
     processes(scenario)?;
     crate::outages::check(scenario)?;
     realtime(scenario)?;

@@ -51,6 +51,10 @@ pub struct Safety {
     pub max_message_age_ms: f64,
     /// How far the clocks of two boards may drift apart before they are set anew (µs).
     pub max_clock_error_us: f64,
+    /// How long the operator at the workstation sees a stopped arm at rest, with the cause of its stop gone, before it is
+    /// acknowledged and the task goes on from there (s); none = never.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acknowledge_s: Option<f64>,
 }
 
 impl Default for Safety {
@@ -75,6 +79,7 @@ impl Default for Safety {
             stop_time_ms: 200.0,
             max_message_age_ms: 1.0,
             max_clock_error_us: 200.0,
+            acknowledge_s: None,
         }
     }
 }

@@ -18,10 +18,8 @@ const YIELD_LIMIT: Duration = Duration::from_micros(500);
 const BLOCK_AT_ONCE: u32 = 1000;
 /// Yields before blocking.
 const YIELDS: u32 = 20;
-/// Where the shared number lies, in the first bell's words.
-const ROUND_WORD: usize = 2;
-/// Where the boards' answers lie, behind it.
-const ANSWER_WORDS: usize = 8;
+/// Where the number of the turn lies, in the first bell's words.
+const TURN_WORD: usize = 2;
 /// Words from one bell to the next: a cache line pair each.
 const STRIDE: usize = 32;
 
@@ -71,24 +69,14 @@ impl Bells {
         self.page.word(index * STRIDE + word)
     }
 
-    /// A number that all processes share.
-    pub fn round(&self) -> u32 {
-        self.word(0, ROUND_WORD).load(Ordering::SeqCst)
+    /// Number of the turn that is to be taken now.
+    pub fn turn(&self) -> u32 {
+        self.word(0, TURN_WORD).load(Ordering::SeqCst)
     }
 
-    /// Sets it; seen by everybody who hears a later ring.
-    pub fn set_round(&self, round: u32) {
-        self.word(0, ROUND_WORD).store(round, Ordering::SeqCst);
-    }
-
-    /// Board number `board` has done what the grant with this number asked for, and has nothing to say.
-    pub fn set_answered(&self, board: usize, grant: u32) {
-        self.word(0, ANSWER_WORDS + board).store(grant, Ordering::SeqCst);
-    }
-
-    /// The grant that board number `board` has answered in this way last.
-    pub fn answered(&self, board: usize) -> u32 {
-        self.word(0, ANSWER_WORDS + board).load(Ordering::SeqCst)
+    /// Hands it on; seen by everybody who hears a later ring.
+    pub fn set_turn(&self, turn: u32) {
+        self.word(0, TURN_WORD).store(turn, Ordering::SeqCst);
     }
 
     /// Puts 32-bit words where bells from `first` on would be; there must be room.
@@ -103,13 +91,8 @@ impl Bells {
 
     /// Rings the bell of process `index`.
     pub fn ring(&self, index: usize) {
-        self.ring_times(index, 1);
-    }
-
-    /// Rings it so many times, with one wake-up.
-    pub fn ring_times(&self, index: usize, times: u32) {
         let counter = self.word(index, 0);
-        counter.fetch_add(times, Ordering::SeqCst);
+        counter.fetch_add(1, Ordering::SeqCst);
         if self.word(index, 1).load(Ordering::SeqCst) != 0 {
             // a failed wake only means that nobody sleeps
             let _ = futex::wake(counter, futex::Flags::empty(), i32::MAX as u32);

@@ -22,18 +22,10 @@ pub struct Grant {
     pub task: u32,
     /// Its activation number.
     pub job: u32,
-    /// Bell of who has the next turn; [`NOBODY`] = none.
+    /// Bell to ring when the board has acted; [`NOBODY`] = none.
     pub next: u32,
-    /// Round of turns that it belongs to; void once the shared number of the bells is higher. 0 = never void.
-    pub round: u32,
-}
-
-impl Grant {
-    /// Number by which a board without anything to say answers: another one for every grant of a round of turns, and for
-    /// the same window's in the next one.
-    pub fn number(&self) -> u32 {
-        (self.window as u32).wrapping_mul(4) | self.round & 3
-    }
+    /// Number of the turn in which the board acts, where [`flags::TURN`] is set; void once a later one is due.
+    pub turn: u32,
 }
 
 /// No bell is rung after the board has acted.
@@ -52,6 +44,11 @@ pub mod flags {
     /// Grant: real time. First with `from` 0: get ready, and answer; then simulated time 0 is when CLOCK_MONOTONIC shows
     /// `from` ns, not answered.
     pub const START: u32 = 128;
+    /// Grant: to be acted on in its turn. A board that has nothing to say hands the turn on, and that is its answer; one
+    /// that has, replies, and rings for the chassis.
+    pub const TURN: u32 = 256;
+    /// Grant: the chassis is rung, too.
+    pub const TELL: u32 = 512;
     /// Reply: the operations that follow, up to the first [`super::OpRecord::of_task`], are the rest of the job; otherwise
     /// the last rest is used again.
     pub const NEW_REST: u32 = 16;

@@ -9,6 +9,7 @@ use crate::host::{Answer, Factory, Host};
 use crate::life::Life;
 use crate::remote::{READY, Remote};
 use crate::serve::{CHASSIS_BELL, process_of};
+use crate::turns::Turns;
 use crate::{Context, Observer, Power, RunError, RunFolder};
 use board::{BoardId, Ns, Op};
 use channels::{Bell, Bells, Domain, Exchange};
@@ -60,7 +61,7 @@ pub(crate) struct Boards<'f> {
     pub injections: Injections,
     /// Planned faults of bus and processors; those behind them in the timing plane are boards that are down.
     pub timing_faults: usize,
-    /// Number of the window.
+    /// Number of the window to be granted next.
     pub window: u64,
     /// Simulated time reached.
     pub reached: Ns,
@@ -71,10 +72,8 @@ pub(crate) struct Boards<'f> {
     recorder_sleeps: u32,
     /// Windows for which it is woken at once.
     recorder_batch: u32,
-    /// Answers to the last round, in the order of its grants.
-    pub answers: Vec<Answer>,
-    /// Number of the round of turns; a new one starts when a window is cut short.
-    round: u32,
+    /// Who acts when.
+    pub turns: Turns,
     /// Program and longest rest of each task that its board has asked for so far.
     longest: Vec<[Vec<Op>; 2]>,
     interrupted: &'static AtomicBool,
@@ -131,8 +130,8 @@ impl<'f> Boards<'f> {
                 let pid = power.spawn(&process.name, &command, &folder.path)?;
                 commands.push(command);
                 let records = process.boards.iter().any(|board| board == BoardId::BusAnalyzer.name());
-                if let Some(processor) = processor.as_ref().filter(|_| records) {
-                    processor.release(pid);
+                if let Some(processor) = &processor {
+                    processor.keep(pid, records);
                 }
             }
         }
@@ -140,10 +139,12 @@ impl<'f> Boards<'f> {
         let recorder = place[BoardId::BusAnalyzer as usize];
         let alone = place.iter().filter(|process| **process == recorder).count() == 1;
         let spans = context.measure.then(Vec::new);
+        let place = place.map(|process| away.iter().position(|i| i + 1 == process));
+        let turns = Turns::new(&place, &context);
         let mut boards = Boards {
             host,
             remotes,
-            place: place.map(|process| away.iter().position(|i| i + 1 == process)),
+            place,
             power,
             bells,
             life: Life::new(&scenario),
@@ -165,8 +166,7 @@ impl<'f> Boards<'f> {
             recorder_sleeps: 0,
             // in a process with others, its grants must not stand in theirs' way
             recorder_batch: if alone { RECORDER_BATCH } else { 1 },
-            answers: Vec::with_capacity(BOARDS.len()),
-            round: 1,
+            turns,
             longest: vec![[const { Vec::new() }; 2]; scenario.rack.tasks.len()],
             interrupted,
             processor_kept: processor,
@@ -298,7 +298,7 @@ impl<'f> Boards<'f> {
     /// A grant of the current window.
     pub fn grant_of(&self, board: BoardId, from: Ns, until: Ns, flags: u32) -> Grant {
         let (board, next) = (board as u32, CHASSIS_BELL as u32);
-        Grant { window: self.window, from, until, board, flags, task: 0, job: 0, next, round: 0 }
+        Grant { window: self.window, from, until, board, flags, task: 0, job: 0, next, turn: 0 }
     }
 
     /// Grants and waits for the answer.
@@ -311,58 +311,9 @@ impl<'f> Boards<'f> {
             }
             Some(remote) => {
                 self.send_grant(remote, grant)?;
-                self.collect(remote, board, None)
+                Ok(self.collect(remote, grant)?.unwrap_or_default())
             }
         }
-    }
-
-    /// Lets boards act one after the other, each handing the turn on to the next: the chassis is not between. Ends after a
-    /// board that cuts the window short; there are then fewer answers than grants.
-    pub fn take_turns(&mut self, grants: &[Grant]) -> Result<(), RunError> {
-        self.answers.clear();
-        while let Some(first) = grants.get(self.answers.len()) {
-            let away = grants[self.answers.len()..].iter().map_while(|grant| self.place[grant.board as usize]).count();
-            let leg = &grants[self.answers.len()..][..away.max(1)];
-            match self.place[first.board as usize] {
-                None => {
-                    let answer = self.host.step(first, &self.transfers[first.board as usize])?;
-                    self.answers.push(answer);
-                }
-                Some(remote) => {
-                    for (i, grant) in leg.iter().enumerate() {
-                        let after = leg.get(i + 1).and_then(|next| self.place[next.board as usize]);
-                        let next = after.map_or(CHASSIS_BELL, |remote| self.remotes[remote].bell) as u32;
-                        self.put_grant(&Grant { next, round: self.round, ..*grant })?;
-                    }
-                    self.ring(remote);
-                    self.collect_turns(leg)?;
-                }
-            }
-            if self.answers.iter().zip(grants).any(|(answer, grant)| answer.cuts(grant.until)) {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    fn collect_turns(&mut self, leg: &[Grant]) -> Result<(), RunError> {
-        for grant in leg {
-            let board = BOARDS[grant.board as usize];
-            let Some(remote) = self.place[board as usize] else { continue };
-            let grant = Grant { round: self.round, ..*grant };
-            let answer = self.collect(remote, board, Some(grant.number()))?;
-            let cut = answer.cuts(grant.until);
-            self.answers.push(answer);
-            if cut {
-                // the others' grants lie in their queues: void from now on
-                self.round += 1;
-                if let Some((bells, _)) = &self.bells {
-                    bells.set_round(self.round);
-                }
-                break;
-            }
-        }
-        Ok(())
     }
 
     /// Grants the recorder the window and does not wait for it; it is woken for some windows at a time, and may lag by
@@ -415,7 +366,8 @@ impl<'f> Boards<'f> {
         if let (Some((bells, _)), Some(remote)) = (&self.bells, self.place[BoardId::BusAnalyzer as usize])
             && self.recorder_sleeps > 0
         {
-            bells.ring_times(self.remotes[remote].bell, std::mem::take(&mut self.recorder_sleeps));
+            bells.ring(self.remotes[remote].bell);
+            self.recorder_sleeps = 0;
         }
     }
 
@@ -433,7 +385,8 @@ impl<'f> Boards<'f> {
         }
     }
 
-    fn put_grant(&mut self, grant: &Grant) -> Result<(), RunError> {
+    /// Grants a board in another process its transfers of the window.
+    pub fn put_grant(&mut self, grant: &Grant) -> Result<(), RunError> {
         let Some(remote) = self.place[grant.board as usize] else { return Ok(()) };
         let sent = self.remotes[remote].grant(grant, &self.transfers[grant.board as usize]);
         if sent.is_err() {
@@ -446,23 +399,22 @@ impl<'f> Boards<'f> {
         Ok(sent?)
     }
 
-    /// The board's answer to the current window's grant; one in a turn may be silent, by the grant's number.
-    fn collect(&mut self, remote: usize, board: BoardId, silent: Option<u32>) -> Result<Answer, RunError> {
+    /// The answer to a grant; none where the board has handed its turn on, or has died and the run goes on without it.
+    pub fn collect(&mut self, remote: usize, grant: &Grant) -> Result<Option<Answer>, RunError> {
+        let board = BOARDS[grant.board as usize];
+        let handed_on = |bells: &Bells| grant.flags & flags::TURN != 0 && bells.turn() != grant.turn;
         loop {
-            let is_silent = |bells: &Bells| silent.is_some_and(|number| bells.answered(board as usize) == number);
-            let Some((who, window, answer)) = self.await_reply_or(remote, &is_silent)? else {
-                return Ok(Answer::default());
-            };
+            let Some((who, window, answer)) = self.await_reply_or(remote, &handed_on)? else { return Ok(None) };
             if who == BoardId::BusAnalyzer && self.recorder_owes > 0 {
                 self.recorder_owes -= 1;
                 continue;
             }
-            if who == board && window == self.window {
-                return Ok(answer);
+            if who == board && window == grant.window {
+                return Ok(Some(answer));
             }
             return Err(RunError::BadAnswer {
                 board: who.name(),
-                what: format!("window {window} where `{}` was asked for window {}", board.name(), self.window),
+                what: format!("window {window} where `{}` was asked for window {}", board.name(), grant.window),
                 when: at(self.reached),
             });
         }
@@ -477,18 +429,18 @@ impl<'f> Boards<'f> {
         }
     }
 
-    /// The next answer of a process; none once `is_silent` says that it has nothing to say, or it has died and the run goes
-    /// on without it.
+    /// The next answer of a process; none once `handed_on` says that it has handed its turn on, or it has died and the run
+    /// goes on without it.
     fn await_reply_or(
         &mut self,
         remote: usize,
-        is_silent: &dyn Fn(&Bells) -> bool,
+        handed_on: &dyn Fn(&Bells) -> bool,
     ) -> Result<Option<(BoardId, u64, Answer)>, RunError> {
         // wall time and processor time of the board, at first and since it was last seen at work
         let (mut first, mut waiting): (Option<(Instant, u64)>, Option<(Instant, u64)>) = (None, None);
         loop {
             let Some((bells, bell)) = &mut self.bells else { return Ok(None) };
-            if is_silent(bells) {
+            if handed_on(bells) {
                 return Ok(None);
             }
             if let Some(reply) = self.remotes[remote].reply(self.reached)? {

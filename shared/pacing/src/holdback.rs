@@ -1,8 +1,8 @@
-//! What the recorder hears in which step.
+//! What the recorder and the chassis hear of which window.
 //!
-//! The recorder is not waited for: when it comes to a window's grant, mail of later windows may already have arrived, or not.
-//! So that its record does not depend on that, a step gets exactly what happened before the window's end; the rest stays
-//! for the next one. All of that has been sent before the grant.
+//! Nobody waits for them: when they come to a window, mail of later ones may already have arrived, or not. So that what they
+//! make of it does not depend on that, they get exactly what happened before the window's end, the chassis that at its end
+//! too; the rest stays for the next one. All of that has been sent before they come to the window.
 
 use board::{Mail, Ns};
 
@@ -14,6 +14,11 @@ pub(crate) fn take_before(until: Ns, inbox: &mut Mail, mail: &mut Mail) {
     take(until, &mut inbox.transfers, &mut mail.transfers, |transfer| transfer.data_at);
     take(until, &mut inbox.masters, &mut mail.masters, |master| master.t);
     take(until, &mut inbox.paths, &mut mail.paths, |path| path.t);
+}
+
+/// Moves what happened up to and at `until`.
+pub(crate) fn take_until(until: Ns, inbox: &mut Mail, mail: &mut Mail) {
+    take_before(until + 1, inbox, mail);
 }
 
 fn take<T: Copy>(until: Ns, inbox: &mut Vec<T>, mail: &mut Vec<T>, t: impl Fn(&T) -> Ns) {

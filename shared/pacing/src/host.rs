@@ -2,7 +2,7 @@
 
 use crate::acts::Acts;
 use crate::faults::Clocks;
-use crate::holdback::take_before;
+use crate::holdback::{take_before, take_until};
 use crate::{Context, RunError};
 use board::routes::ROUTES;
 use board::{Board, BoardId, Decision, Inputs, Mail, Ns, Op, Outputs};
@@ -146,10 +146,10 @@ impl Host {
         inputs.transfers.clear();
         inputs.transfers.extend_from_slice(transfers);
         let inbox = &mut self.inboxes[id as usize];
-        if id == BoardId::BusAnalyzer && !inputs.finish {
-            take_before(grant.until, inbox, &mut inputs.mail);
-        } else {
-            std::mem::swap(&mut inputs.mail, inbox);
+        match id {
+            BoardId::BusAnalyzer if inputs.finish => take_until(grant.until, inbox, &mut inputs.mail),
+            BoardId::BusAnalyzer => take_before(grant.until, inbox, &mut inputs.mail),
+            _ => std::mem::swap(&mut inputs.mail, inbox),
         }
         self.outputs.clear();
         let clock = |measured: &Option<(Acts, bool)>| if let Some((_, true)) = measured { wall_ns() } else { 0 };

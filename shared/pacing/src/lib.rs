@@ -2,6 +2,7 @@
 //! and the life and death of the processes of a run.
 //!
 //! * [`Lockstep`] runs the windows: timing plane, then the boards in the order of the signal path.
+//! * `turns`: who acts after whom in a window, without the chassis between.
 //! * [`Realtime`] runs the same windows by the wall clock, peer to peer.
 //! * [`Host`] steps the boards of one process; [`serve`] is the whole `main` of a board's process.
 //! * [`RunFolder`] and [`Power`]: what a run leaves on the machine, and how it goes away again.
@@ -27,6 +28,7 @@ mod realtime;
 mod remote;
 mod run_folder;
 mod serve;
+mod turns;
 
 pub use error::RunError;
 pub use host::{Answer, Factory, Host};

@@ -66,6 +66,11 @@ impl Life {
         self.mail.events.extend(boards.map(lost));
     }
 
+    /// Whether a process has died since the last window.
+    pub fn has_lost(&self) -> bool {
+        !self.died.is_empty()
+    }
+
     /// When a window has to end because boards go down or come up.
     pub fn next_change(&self) -> Ns {
         let returns = self.returns.iter().map(|(at, ..)| *at).min().unwrap_or(Ns::MAX);
@@ -220,8 +225,8 @@ impl Boards<'_> {
         let Some(folder) = &self.folder else { return Ok(()) };
         folder.write_context(&self.context)?;
         let pid = self.power.spawn(&process, &self.commands[remote], &folder.path)?;
-        if let Some(processor) = self.processor_kept.as_ref().filter(|_| boards.contains(&BoardId::BusAnalyzer)) {
-            processor.release(pid);
+        if let Some(processor) = &self.processor_kept {
+            processor.keep(pid, boards.contains(&BoardId::BusAnalyzer));
         }
         self.wait_until_ready(remote)
     }

@@ -7,10 +7,12 @@
 
 use crate::boards::{Boards, program_transfers};
 use crate::error::at;
-use crate::host::Factory;
+use crate::holdback::take_until;
+use crate::host::{Answer, Factory};
 use crate::{Context, RunError};
 use board::{BoardId, Mail, Ns, Op};
 use messages::{BOARDS, Event, EventKind, Grant, Severity, Span, TransferRecord, flags};
+use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use vme::{Log, Stop, Timing};
@@ -43,17 +45,47 @@ pub trait Observer {
     fn measured(&mut self, _spans: &[Span], _lost: u32) {}
 }
 
+/// A window under way.
+struct Window {
+    number: u64,
+    from: Ns,
+    stop: Stop,
+    /// What happened in it on the bus and the processors.
+    log: Log,
+    turns: Vec<Grant>,
+    /// Bus and processors as they stand at its end, before the task that decides there goes on.
+    timing: Timing,
+}
+
+impl Window {
+    fn new(timing: &Timing) -> Window {
+        let (log, turns) = (Log::default(), Vec::with_capacity(BOARDS.len()));
+        Window { number: 0, from: 0, stop: Stop::Limit, log, turns, timing: timing.clone() }
+    }
+
+    fn until(&self) -> Ns {
+        self.timing.now()
+    }
+
+    /// The task that decides at the window's end.
+    fn decides(&self) -> Option<u16> {
+        if let Stop::Decision { task, .. } = self.stop { Some(task) } else { None }
+    }
+}
+
 /// A rack in lock step.
 pub struct Lockstep<'f> {
     timing: Timing,
-    ahead: Timing,
     boards: Boards<'f>,
     /// Rest of the jobs of each task, as its board last said.
     rest: Vec<Vec<Op>>,
-    log: Log,
-    /// Grants of the last round.
-    turns: Vec<Grant>,
+    /// In the order of time.
+    windows: VecDeque<Window>,
+    /// Memory for others.
+    spare: Vec<Window>,
     own_mail: Mail,
+    /// What the chassis hears of a window.
+    mail: Mail,
 }
 
 impl<'f> Lockstep<'f> {
@@ -66,14 +98,17 @@ impl<'f> Lockstep<'f> {
         interrupted: &'static AtomicBool,
     ) -> Result<Lockstep<'f>, RunError> {
         let (boards, timing) = Boards::power_up(context, factory, programs, interrupted)?;
+        if let Some(processor) = boards.processor_kept.as_ref().filter(|_| boards.turns.ahead > 1) {
+            processor.leave();
+        }
         Ok(Lockstep {
-            ahead: timing.clone(),
             rest: vec![Vec::new(); timing.rack().tasks.len()],
             timing,
+            windows: VecDeque::with_capacity(boards.turns.ahead),
+            spare: Vec::with_capacity(boards.turns.ahead),
             boards,
-            log: Log::default(),
-            turns: Vec::with_capacity(BOARDS.len()),
             own_mail: Mail::default(),
+            mail: Mail::default(),
         })
     }
 
@@ -113,18 +148,12 @@ impl<'f> Lockstep<'f> {
             if self.boards.window.is_multiple_of(1024) {
                 self.boards.watch()?;
             }
-            self.boards.change_lives(self.timing.now(), &mut self.timing, &mut self.rest)?;
-            let flow = self.step(end, observer)?;
-            let until = self.timing.now();
-            let mail = self.boards.host.read()?;
-            if let Some(probe) = mail.plant_probe.last() {
-                self.boards.life.lines.probe(probe);
+            if self.windows.is_empty() {
+                self.boards.change_lives(self.timing.now(), &mut self.timing, &mut self.rest)?;
             }
-            let flow = match observer.window(until, mail, &self.log) {
-                Flow::Stop => Flow::Stop,
-                Flow::Continue => flow,
-            };
-            mail.clear();
+            self.open_windows(end)?;
+            let Some(window) = self.windows.pop_front() else { break };
+            let flow = self.close(window, observer)?;
             self.boards.show_spans(observer)?;
             if flow == Flow::Stop {
                 break;
@@ -136,99 +165,88 @@ impl<'f> Lockstep<'f> {
     /// Ends the run: the recorder closes its file, the processes leave. Returns what the boards still had to say.
     pub fn finish(mut self) -> Result<(), RunError> {
         let now = self.timing.now();
+        // the boards may be further than the last window that was closed
+        let reached = self.windows.back().map_or(now, Window::until);
+        while let Some(window) = self.windows.pop_front() {
+            if self.boards.see_through(&window.turns)?.is_some() {
+                self.boards.void_turns();
+                self.windows.clear();
+            }
+        }
         self.boards.wake_recorder();
         for board in BOARDS[1..].iter().filter(|board| !self.boards.life.is_down(**board)).collect::<Vec<_>>() {
-            let grant = self.boards.grant_of(*board, now, now, flags::FINISH);
+            let at = if *board == BoardId::BusAnalyzer { now } else { reached };
+            let grant = self.boards.grant_of(*board, at, at, flags::FINISH);
             self.boards.ask(&grant)?;
         }
         self.boards.power.shut_down();
         Ok(())
     }
 
-    /// One window.
-    fn step(&mut self, end: Ns, observer: &mut dyn Observer) -> Result<Flow, RunError> {
-        let from = self.timing.now();
-        let limit = end.min(from + MAX_WINDOW).min(self.boards.life.next_change());
+    /// Opens windows up to `end`, as many as may be under way.
+    fn open_windows(&mut self, end: Ns) -> Result<(), RunError> {
+        let end = end.min(self.boards.life.next_change());
+        while self.windows.len() < self.boards.turns.ahead
+            && self.windows.back().map_or(self.timing.now(), Window::until) < end
+            && (self.windows.is_empty() || !self.boards.life.has_lost())
+        {
+            self.open(end)?;
+        }
+        Ok(())
+    }
+
+    /// Opens the next window, up to `end` at most: the boards get their turns.
+    fn open(&mut self, end: Ns) -> Result<(), RunError> {
+        let mut window = self.spare.pop().unwrap_or_else(|| Window::new(&self.timing));
+        window.timing.clone_from(self.windows.back().map_or(&self.timing, |before| &before.timing));
+        if let Some(task) = self.windows.back().and_then(Window::decides) {
+            window.timing.resume(task, &self.rest[usize::from(task)]);
+        }
+        (window.number, window.from) = (self.boards.window, window.timing.now());
         // what has to be there when the boards act
         self.own_mail.clear();
         self.own_mail.amplifier.append(&mut self.boards.life.mail.amplifier);
         if !self.own_mail.amplifier.is_empty() {
             self.boards.host.send(&self.own_mail)?;
         }
-        let mut stop = self.look_ahead(limit);
-        let mut until = self.ahead.now();
-
-        self.plan_turns(&WIRES, from, until, stop);
-        self.boards.take_turns(&self.turns)?;
-        if self.boards.answers.len() < self.turns.len()
-            && let Some((BoardId::HwSim, early)) = self.cut()
-        {
-            if early <= from {
-                return Err(RunError::BadAnswer {
-                    board: BoardId::HwSim.name(),
-                    what: format!("an early return at {early} ns, outside ({from}, {until}] ns"),
-                    when: at(from),
-                });
-            }
-            stop = self.look_ahead(early);
-            until = early;
-            self.plan_turns(&WIRES_AGAIN, from, until, stop);
-            let da_io = self.turns.iter_mut().filter(|turn| turn.board == BoardId::DaIo as u32);
-            da_io.for_each(|turn| turn.flags |= flags::RERUN);
-            self.boards.take_turns(&self.turns)?;
-        }
-        for i in 0..self.turns.len() {
-            self.answered(i)?;
-        }
-        self.own_mail.clear();
-        self.own_mail.events.append(&mut self.boards.life.mail.events);
-        let written = &self.boards.transfers[BoardId::DaIo as usize];
-        self.boards.life.lines.transfers(written);
-        self.boards.injections.tell(until, &mut self.own_mail.events);
-        if let Stop::Overrun { task, job } = stop {
-            self.ahead.halt(task);
-            let event = Event::new(until, EventKind::OverrunTrip, Severity::Error, job.into(), task.into());
-            self.own_mail.events.push(event);
-        }
-        observer.account(until, &self.log, &mut self.own_mail);
-        self.record(from, until)?;
-        std::mem::swap(&mut self.timing, &mut self.ahead);
-        self.boards.reached = until;
+        let limit = end.min(window.from + MAX_WINDOW);
+        self.look_ahead(&mut window, limit);
+        self.plan_turns(&mut window, &WIRES);
+        let tell = self.boards.turns.tells(window.number) || window.until() >= end;
+        self.boards.give_turns(&mut window.turns, tell)?;
+        self.boards.life.lines.transfers(&self.boards.transfers[BoardId::DaIo as usize]);
         self.boards.window += 1;
-        Ok(Flow::Continue)
+        self.windows.push_back(window);
+        Ok(())
     }
 
-    /// Runs a copy of the timing plane to the next decision point or `limit`, and sorts the transfers by the board they are made to.
-    fn look_ahead(&mut self, limit: Ns) -> Stop {
-        self.ahead.clone_from(&self.timing);
-        self.log.clear();
-        let mut stop = self.ahead.advance(limit, &mut self.log);
+    /// Runs the window's copy of the timing plane to the next decision point or `limit`, and sorts the transfers by the
+    /// board they are made to.
+    fn look_ahead(&mut self, window: &mut Window, limit: Ns) {
+        window.log.clear();
+        window.stop = window.timing.advance(limit, &mut window.log);
         // boards that are down have been told of, and this window began there
-        while let Stop::Fault { fault } = stop
+        while let Stop::Fault { fault } = window.stop
             && usize::from(fault) >= self.boards.timing_faults
         {
-            stop = self.ahead.advance(limit, &mut self.log);
+            window.stop = window.timing.advance(limit, &mut window.log);
         }
-        self.boards.sort_transfers(&self.log);
-        stop
-    }
-
-    /// The recorder gets the window's transfers and a grant.
-    fn record(&mut self, from: Ns, until: Ns) -> Result<(), RunError> {
-        self.own_mail.transfers.extend(program_transfers(&self.log).map(TransferRecord::from));
-        self.boards.host.send(&self.own_mail)?;
-        let grant = self.boards.grant_of(BoardId::BusAnalyzer, from, until, 0);
-        self.boards.grant_recorder(&grant)
+        if let Stop::Overrun { task, .. } = window.stop {
+            window.timing.halt(task);
+        }
+        self.boards.sort_transfers(&window.log);
     }
 
     /// Who has a turn in a window: the boards on the wires, then the masters that decide or were written to.
-    fn plan_turns(&mut self, wires: &[BoardId], from: Ns, until: Ns, stop: Stop) {
-        self.turns.clear();
+    fn plan_turns(&mut self, window: &mut Window, wires: &[BoardId]) {
+        let (from, until) = (window.from, window.until());
+        let grant_of = |board| Grant { window: window.number, ..self.boards.grant_of(board, from, until, 0) };
         let up = |board: &&BoardId| !self.boards.life.is_down(**board);
-        self.turns.extend(wires.iter().filter(up).map(|board| self.boards.grant_of(*board, from, until, 0)));
+        window.turns.clear();
+        window.turns.extend(wires.iter().filter(up).map(|board| grant_of(*board)));
         for board in [BoardId::ControlComputer, BoardId::Workstation].iter().filter(up).copied() {
-            let mut grant = self.boards.grant_of(board, from, until, 0);
-            if let Stop::Decision { task, job } = stop
+            let mut grant = grant_of(board);
+            if let Stop::Decision { task, job } = window.stop
                 && self.boards.of_task[usize::from(task)] == board
             {
                 grant.flags = flags::DECIDE;
@@ -236,41 +254,106 @@ impl<'f> Lockstep<'f> {
             } else if self.boards.transfers[board as usize].is_empty() {
                 continue;
             }
-            self.turns.push(grant);
+            window.turns.push(grant);
         }
     }
 
-    /// The board that cut the last round short, and to when.
-    fn cut(&self) -> Option<(BoardId, Ns)> {
-        let last = self.boards.answers.len().checked_sub(1)?;
-        Some((BOARDS[self.turns[last].board as usize], self.boards.answers[last].early?))
+    /// Sees a window through to its end: what happened in it goes to the record and to the observer.
+    fn close(&mut self, mut window: Window, observer: &mut dyn Observer) -> Result<Flow, RunError> {
+        let (mut taken, mut programs) = (0, Vec::new());
+        while let Some((place, answer)) = self.boards.see_through(&window.turns[taken..])? {
+            // the windows behind this one were opened without knowing of it
+            self.boards.void_turns();
+            self.spare.extend(self.windows.drain(..));
+            self.boards.window = window.number + 1;
+            taken += place;
+            let board = BOARDS[window.turns[taken].board as usize];
+            match answer.early {
+                Some(early) if answer.cuts(window.until()) => {
+                    self.cut(&mut window, board, early)?;
+                    taken = 0;
+                }
+                _ => {
+                    self.take_in(&window, board, answer, &mut programs)?;
+                    taken += 1;
+                    self.boards.sort_transfers(&window.log);
+                }
+            }
+            self.boards.give_turns(&mut window.turns[taken..], true)?;
+        }
+        if let Some(task) = window.decides() {
+            window.timing.resume(task, &self.rest[usize::from(task)]);
+        }
+        for (task, program) in &programs {
+            window.timing.set_program(*task, program);
+        }
+        let (from, until) = (window.from, window.until());
+        self.own_mail.clear();
+        self.own_mail.events.append(&mut self.boards.life.mail.events);
+        self.boards.injections.tell(until, &mut self.own_mail.events);
+        if let Stop::Overrun { task, job } = window.stop {
+            let event = Event::new(until, EventKind::OverrunTrip, Severity::Error, job.into(), task.into());
+            self.own_mail.events.push(event);
+        }
+        observer.account(until, &window.log, &mut self.own_mail);
+        self.own_mail.transfers.extend(program_transfers(&window.log).map(TransferRecord::from));
+        self.boards.host.send(&self.own_mail)?;
+        let grant = self.boards.grant_of(BoardId::BusAnalyzer, from, until, 0);
+        self.boards.grant_recorder(&Grant { window: window.number, ..grant })?;
+        std::mem::swap(&mut self.timing, &mut window.timing);
+        self.boards.reached = until;
+        self.mail.clear();
+        take_until(until, self.boards.host.read()?, &mut self.mail);
+        if let Some(probe) = self.mail.plant_probe.last() {
+            self.boards.life.lines.probe(probe);
+        }
+        let flow = observer.window(until, &self.mail, &window.log);
+        self.spare.push(window);
+        Ok(flow)
     }
 
-    /// Takes in what a board answered in its turn.
-    fn answered(&mut self, turn: usize) -> Result<(), RunError> {
-        let grant = self.turns[turn];
-        let board = BOARDS[grant.board as usize];
-        let answer = self.boards.answers.get_mut(turn).map(std::mem::take).unwrap_or_default();
-        if let Some(early) = answer.early
-            && board != BoardId::HwSim
-        {
+    /// A board has cut the window short: it is run again to that instant, by those that have acted before and by those
+    /// that have not.
+    fn cut(&mut self, window: &mut Window, board: BoardId, early: Ns) -> Result<(), RunError> {
+        let bad = |what| Err(RunError::BadAnswer { board: board.name(), what, when: at(window.from) });
+        if board != BoardId::HwSim {
+            return bad(format!("an early return at {early} ns; only hw_sim may cut a window"));
+        }
+        if early <= window.from {
+            return bad(format!("an early return at {early} ns, outside ({}, {}] ns", window.from, window.until()));
+        }
+        window.timing.clone_from(&self.timing);
+        self.look_ahead(window, early);
+        self.plan_turns(window, &WIRES_AGAIN);
+        let da_io = window.turns.iter_mut().filter(|turn| turn.board == BoardId::DaIo as u32);
+        da_io.for_each(|turn| turn.flags |= flags::RERUN);
+        Ok(())
+    }
+
+    /// Takes in what a board answered in its turn; new programs hold from the window's end on.
+    fn take_in(
+        &mut self,
+        window: &Window,
+        board: BoardId,
+        answer: Answer,
+        programs: &mut Vec<(u16, Vec<Op>)>,
+    ) -> Result<(), RunError> {
+        if let Some(early) = answer.early.filter(|_| board != BoardId::HwSim) {
             return Err(RunError::BadAnswer {
                 board: board.name(),
                 what: format!("an early return at {early} ns; only hw_sim may cut a window"),
-                when: at(self.timing.now()),
+                when: at(window.from),
             });
         }
-        if grant.flags & flags::DECIDE != 0 {
-            let task = grant.task as u16;
-            if let Some(rest) = answer.rest {
-                self.boards.note_rest(task, &rest);
-                self.rest[usize::from(task)] = rest;
-            }
-            self.ahead.resume(task, &self.rest[usize::from(task)]);
+        if let (Some(task), Some(rest)) = (window.decides(), answer.rest)
+            && self.boards.of_task[usize::from(task)] == board
+        {
+            self.boards.note_rest(task, &rest);
+            self.rest[usize::from(task)] = rest;
         }
         for (task, program) in answer.programs {
             self.boards.note_program(board, task, &program)?;
-            self.ahead.set_program(task, &program);
+            programs.push((task, program));
         }
         Ok(())
     }

@@ -4,10 +4,10 @@ use crate::faults::tampering;
 use crate::host::{Answer, Factory, Host};
 use crate::realtime::{self, Paced};
 use crate::remote::{Line, READY};
-use crate::{RunError, RunFolder};
+use crate::{RunError, RunFolder, turns};
 use board::BoardId;
 use channels::{Bells, Domain, Exchange, sleep_until, wall_ns};
-use messages::{BOARDS, Grant, NOBODY, flags};
+use messages::{BOARDS, Grant, NOBODY, TransferRecord, flags};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -71,16 +71,21 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
     let mut until = 0;
     let mut patience = LIFELINE_PERIOD;
     let mut paced: Option<Paced> = None;
-    // how many grants it may act on
-    let mut turns = 0;
+    // a grant whose turn has not come
+    let mut waiting: Option<Grant> = None;
     loop {
-        turns += bell.rung();
-        while turns > 0 || paced.is_some() {
-            let Some(grant) = line.grant(&mut transfers)? else { break };
-            if grant.round != 0 && grant.round < bells.round() {
-                continue;
+        while let Some(grant) = next_grant(&mut line, &mut waiting, &mut transfers)? {
+            if grant.flags & flags::TURN != 0 {
+                let turns_before = grant.turn.wrapping_sub(bells.turn()) as i32;
+                if turns_before > 0 {
+                    waiting = Some(grant);
+                    break;
+                }
+                if turns_before < 0 {
+                    // void
+                    continue;
+                }
             }
-            turns = turns.saturating_sub(1);
             if grant.flags & flags::START != 0 && grant.from != 0 {
                 paced = Some(Paced::new(grant.from, &context.scenario));
                 continue;
@@ -115,17 +120,19 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
                 patience = LEAVING_PERIOD;
             }
             let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
-            if grant.round != 0 && answer == Answer::default() {
-                bells.set_answered(board as usize, grant.number());
-            } else {
-                line.reply(board, grant.window, &answer)?;
+            match grant.flags & flags::TURN != 0 {
+                true if answer == Answer::default() => turns::hand_on(&bells, &grant),
+                true => {
+                    line.reply(board, grant.window, &answer)?;
+                    bells.ring(CHASSIS_BELL);
+                }
+                false => {
+                    line.reply(board, grant.window, &answer)?;
+                    if grant.next != NOBODY {
+                        bells.ring(grant.next as usize);
+                    }
+                }
             }
-            match grant.next {
-                _ if answer.cuts(until) => bells.ring(CHASSIS_BELL),
-                NOBODY => {}
-                next => bells.ring(next as usize),
-            }
-            turns += bell.rung();
         }
         if let Some(paced) = &mut paced
             && let Some(due) = paced.due()
@@ -147,9 +154,7 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
             }
             continue;
         }
-        let rung = bell.wait(patience);
-        turns += rung;
-        if rung == 0 && lifeline_cut() {
+        if bell.wait(patience) == 0 && lifeline_cut() {
             if here.contains(&BoardId::BusAnalyzer) {
                 // the record up to here is worth keeping
                 while let Some(grant) = line.grant(&mut transfers)? {
@@ -165,9 +170,21 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
     }
 }
 
+/// The grant that waits for its turn, or the next one.
+fn next_grant(
+    line: &mut Line,
+    waiting: &mut Option<Grant>,
+    transfers: &mut Vec<TransferRecord>,
+) -> Result<Option<Grant>, RunError> {
+    match waiting.take() {
+        Some(grant) => Ok(Some(grant)),
+        None => Ok(line.grant(transfers)?),
+    }
+}
+
 pub(crate) fn closing_grant(board: BoardId, until: vme::Ns) -> Grant {
     let (board, flags) = (board as u32, flags::FINISH);
-    Grant { window: u64::MAX - 1, from: until, until, board, flags, task: 0, job: 0, next: NOBODY, round: 0 }
+    Grant { window: u64::MAX - 1, from: until, until, board, flags, task: 0, job: 0, next: NOBODY, turn: 0 }
 }
 
 /// Number of the process that hosts the board; the chassis is 0. Boards of a process named `chassis` live in it.

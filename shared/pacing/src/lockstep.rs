@@ -19,6 +19,8 @@ use vme::{Log, Stop, Timing};
 
 /// Longest window: bounds what a board has to keep.
 const MAX_WINDOW: Ns = 10 * vme::MILLISECOND;
+/// Once in so many windows somebody looks whether all processes live and the user wants to stop, between two windows.
+const WATCH_WINDOWS: u64 = 1024;
 /// The boards on the wires, in the order in which signals pass them.
 const WIRES: [BoardId; 4] = [BoardId::DaIo, BoardId::HwSim, BoardId::ForceSensorIf, BoardId::EncoderIf];
 /// Those that act when the arm has cut a window short; the arm itself has.
@@ -98,14 +100,14 @@ impl<'f> Lockstep<'f> {
         interrupted: &'static AtomicBool,
     ) -> Result<Lockstep<'f>, RunError> {
         let (boards, timing) = Boards::power_up(context, factory, programs, interrupted)?;
-        if let Some(processor) = boards.processor_kept.as_ref().filter(|_| boards.turns.ahead > 1) {
+        if let Some(processor) = boards.processor_kept.as_ref().filter(|_| boards.turns.most > 1) {
             processor.leave();
         }
         Ok(Lockstep {
             rest: vec![Vec::new(); timing.rack().tasks.len()],
             timing,
-            windows: VecDeque::with_capacity(boards.turns.ahead),
-            spare: Vec::with_capacity(boards.turns.ahead),
+            windows: VecDeque::with_capacity(boards.turns.most),
+            spare: Vec::with_capacity(boards.turns.most),
             boards,
             own_mail: Mail::default(),
             mail: Mail::default(),
@@ -145,10 +147,10 @@ impl<'f> Lockstep<'f> {
     /// Runs to `end`, or until the observer stops the run.
     pub fn run(&mut self, end: Ns, observer: &mut dyn Observer) -> Result<(), RunError> {
         while self.timing.now() < end {
-            if self.boards.window.is_multiple_of(1024) {
-                self.boards.watch()?;
-            }
             if self.windows.is_empty() {
+                if self.boards.window.is_multiple_of(WATCH_WINDOWS) {
+                    self.boards.watch()?;
+                }
                 self.boards.change_lives(self.timing.now(), &mut self.timing, &mut self.rest)?;
             }
             self.open_windows(end)?;
@@ -188,7 +190,7 @@ impl<'f> Lockstep<'f> {
         let end = end.min(self.boards.life.next_change());
         while self.windows.len() < self.boards.turns.ahead
             && self.windows.back().map_or(self.timing.now(), Window::until) < end
-            && (self.windows.is_empty() || !self.boards.life.has_lost())
+            && (self.windows.is_empty() || !self.boards.life.has_lost() && !self.boards.window.is_multiple_of(WATCH_WINDOWS))
         {
             self.open(end)?;
         }
@@ -261,6 +263,7 @@ impl<'f> Lockstep<'f> {
     /// Sees a window through to its end: what happened in it goes to the record and to the observer.
     fn close(&mut self, mut window: Window, observer: &mut dyn Observer) -> Result<Flow, RunError> {
         let (mut taken, mut programs) = (0, Vec::new());
+        self.boards.turns.look_further();
         while let Some((place, answer)) = self.boards.see_through(&window.turns[taken..])? {
             // the windows behind this one were opened without knowing of it
             self.boards.void_turns();

@@ -8,8 +8,8 @@ use channels::{ChannelError, Domain, Port, Sender};
 use messages::{Grant, Header, OpRecord, Reply, Span, TransferRecord, flags};
 use vme::Ns;
 
-/// Grants that may be under way: the recorder's credit and some.
-const BUFFER: usize = 80;
+/// Grants that may be under way: those of all boards for the windows ahead, void ones too, and the recorder's credit.
+const BUFFER: usize = 256;
 /// Transfers of a grant, operations of a reply: longer messages allocate once.
 const LENGTH: usize = 64;
 /// No board has a longer program.

@@ -21,8 +21,10 @@ pub(crate) struct Turns {
     due: u32,
     /// Number of the next turn to be given.
     next: u32,
-    /// Windows that may be under way.
+    /// Windows that may be under way now: fewer behind one in which a board had something to say.
     pub ahead: usize,
+    /// The most that there may be.
+    pub most: usize,
 }
 
 impl Turns {
@@ -33,12 +35,17 @@ impl Turns {
         };
         // what the chassis does between two windows needs the window's end: outages, and what is measured
         let apart = BOARDS.iter().all(away) && context.scenario.outages().is_empty() && !context.measure;
-        Turns { due: 0, next: 0, ahead: if apart { LOOKAHEAD } else { 1 } }
+        Turns { due: 0, next: 0, ahead: 1, most: if apart { LOOKAHEAD } else { 1 } }
+    }
+
+    /// A window has passed in which nobody had anything to say.
+    pub fn look_further(&mut self) {
+        self.ahead = (2 * self.ahead).min(self.most);
     }
 
     /// Whether the chassis wants to hear of the end of the window with this number.
     pub fn tells(&self, window: u64) -> bool {
-        window.is_multiple_of((self.ahead as u64 / 2).max(1))
+        (window + 1).is_multiple_of((self.ahead as u64 / 2).max(1))
     }
 }
 
@@ -124,6 +131,7 @@ impl Boards<'_> {
 
     /// Turns that have been given and not taken are void; nobody is acting.
     pub fn void_turns(&mut self) {
+        self.turns.ahead = 1;
         self.set_due(self.turns.next);
     }
 }

@@ -424,13 +424,15 @@ impl<'f> Boards<'f> {
         }
     }
 
-    /// The next answer of a process.
+    /// The next answer of a process; one that the run could do without must live up to here, too.
     pub fn await_reply(&mut self, remote: usize) -> Result<(BoardId, u64, Answer), RunError> {
-        loop {
-            if let Some(reply) = self.await_reply_or(remote, &|_| false)? {
-                return Ok(reply);
-            }
-        }
+        let reply = self.await_reply_or(remote, &|_| false)?;
+        let process = &self.remotes[remote].process;
+        reply.ok_or_else(|| RunError::Died {
+            process: process.clone(),
+            how: self.life.died(process).unwrap_or("has ended").to_owned(),
+            when: at(self.reached),
+        })
     }
 
     /// The next answer of a process; none once `handed_on` says that it has handed its turn on, or it has died and the run
@@ -442,6 +444,7 @@ impl<'f> Boards<'f> {
     ) -> Result<Option<(BoardId, u64, Answer)>, RunError> {
         // wall time and processor time of the board, at first and since it was last seen at work
         let (mut first, mut waiting): (Option<(Instant, u64)>, Option<(Instant, u64)>) = (None, None);
+        let mut amiss = Ok(());
         loop {
             let Some((bells, bell)) = &mut self.bells else { return Ok(None) };
             if handed_on(bells) {
@@ -450,12 +453,18 @@ impl<'f> Boards<'f> {
             if let Some(reply) = self.remotes[remote].reply(self.reached)? {
                 return Ok(Some(reply));
             }
-            if bell.wait(WATCH_PERIOD) > 0 {
-                continue;
-            }
-            self.watch()?;
+            // counts only where the board has not gone on before it happened
+            amiss?;
             if BOARDS.iter().any(|board| self.place[*board as usize] == Some(remote) && self.life.is_down(*board)) {
                 return Ok(None);
+            }
+            if bell.wait(WATCH_PERIOD) > 0 {
+                amiss = Ok(());
+                continue;
+            }
+            amiss = self.watch();
+            if amiss.is_err() {
+                continue;
             }
             let name = &self.remotes[remote].process;
             let used = self.power.used(name);

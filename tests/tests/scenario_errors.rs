@@ -147,3 +147,19 @@ fn an_inertia_that_no_body_has_is_refused() {
     // the bench's path differs from run to run
     insta::assert_snapshot!(refusal.replace(bench.path("").to_str().expect("path"), ""));
 }
+
+#[test]
+fn a_bus_program_that_cannot_fit_its_period_is_refused_unless_the_task_says_what_an_overrun_does() {
+    let bench = Bench::new();
+    let generic = ["--in-process", "--no-record", "--out", "out", "--duration", "0.02", "--set", "controller.processor=68030-generic"];
+    let run = [["run", "table-5-3", "--variant", "modified"].as_slice(), generic.as_slice()].concat();
+    let refused = bench.run(&run).expect_code(2).expect_nothing_left();
+    refused.expect_message("program of task `control` needs").expect_message("on `cpu-1`, its period is 5000000 ns");
+    let error = bench.run(&[run.as_slice(), &["--set", "rack.tasks.control.overrun=skip"][..]].concat());
+    assert!(!error.stderr.contains("program of task"), "{}", error.stderr);
+
+    let short = SOUND.replacen("[plant]", "[controller]\nprocessor = \"68030-generic\"\n\n[plant]", 1);
+    bench.write("short.toml", short);
+    bench.run(&["scenario", "check", "short.toml"]).expect_code(2).expect_message("program of task `control` needs");
+    bench.run(&["scenario", "check", "processor-time"]).expect_code(0);
+}

@@ -50,6 +50,8 @@ pub struct Setting {
     pub measure: bool,
 }
 
+/// Longest rehearsal: every usual task has decided by then.
+const REHEARSED: Ns = 1000 * vme::MILLISECOND;
 /// Events of severity error that a watcher sees.
 const FAULTS: usize = 8;
 
@@ -160,29 +162,43 @@ fn carry_out(
     }
 }
 
-/// Runs the start of a scenario in this process, three periods of its slowest task, and returns the longest job of each
-/// task with the account of bus and processors.
-pub fn rehearse(scenario: &Scenario) -> Result<(Vec<Program>, BusAccount), String> {
-    let periods = scenario.rack.tasks.iter().map(|task| task.period_ns);
-    let end = 3 * periods.max().unwrap_or(vme::MILLISECOND);
-    let mut listener = Listener(Accounting::new(scenario).map_err(|error| error.to_string())?);
-    let rack = listen(scenario, end, &mut listener)?;
+/// Runs the start of a scenario in this process, three periods of its slowest task but at most [`REHEARSED`], and returns
+/// the longest job of each task with the account of bus and processors. The error says what of the scenario its boards
+/// or its rack cannot carry out.
+pub fn rehearse(scenario: &Scenario) -> Result<(Vec<Program>, BusAccount), RunError> {
+    let longest = scenario.rack.tasks.iter().map(|task| task.period_ns).max().unwrap_or(vme::MILLISECOND);
+    let mut listener = Listener(Accounting::new(scenario)?);
+    let rack = listen(scenario, longest.saturating_mul(3).min(REHEARSED), &mut listener)?;
     let programs = rack.programs();
     let account = listener.0.close(rack.timing(), &programs);
     Ok((programs, account))
 }
 
 /// Runs the start of a scenario in this process, up to `end`, for somebody who listens.
-pub fn listen(scenario: &Scenario, end: Ns, observer: &mut dyn Observer) -> Result<Lockstep<'static>, String> {
+pub fn listen(scenario: &Scenario, end: Ns, observer: &mut dyn Observer) -> Result<Lockstep<'static>, RunError> {
     let scenario = scenario.clone();
     let (prefix, variant) = (String::new(), String::new());
     let context = Context { prefix, variant, record: None, measure: false, in_process: true, scenario };
-    let run = || -> Result<Lockstep<'static>, RunError> {
-        let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
-        rack.run(end, observer)?;
-        Ok(rack)
-    };
-    run().map_err(|error| error.to_string())
+    let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
+    rack.run(end, observer)?;
+    Ok(rack)
+}
+
+/// Whether boards and rack can carry the scenario out, as far as a rehearsal shows. What a program of the user's own asks
+/// for, it says itself when it runs.
+pub fn check(scenario: &Scenario) -> Result<(), RunError> {
+    if scenario.processes.iter().any(|process| !process.command.is_empty()) {
+        return Ok(());
+    }
+    match rehearse(scenario) {
+        Err(error) if is_of_the_scenario(&error) => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Whether a run failed because the scenario asks for what its boards or its rack cannot do.
+pub fn is_of_the_scenario(error: &RunError) -> bool {
+    matches!(error, RunError::Rack(_) | RunError::Board { .. })
 }
 
 struct Listener(Accounting);

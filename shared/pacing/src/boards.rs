@@ -7,7 +7,7 @@ use crate::error::at;
 use crate::faults::{Injections, tampering};
 use crate::host::{Answer, Factory, Host};
 use crate::life::Life;
-use crate::remote::{READY, Remote};
+use crate::remote::{MAX_OPS, READY, Remote};
 use crate::serve::{CHASSIS_BELL, process_of};
 use crate::turns::Turns;
 use crate::{Context, Observer, Power, RunError, RunFolder};
@@ -17,6 +17,7 @@ use messages::{BOARDS, Grant, NOBODY, Span, TransferRecord, flags};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use vme::rack::Rack;
 use vme::{Log, Origin, Status, Timing, Transfer};
 
 /// How often a wait looks whether everybody still lives.
@@ -178,7 +179,7 @@ impl<'f> Boards<'f> {
         for board in &BOARDS[1..] {
             let answer = boards.ask(&boards.grant_of(*board, 0, 0, flags::BOOT))?;
             for (task, program) in answer.programs {
-                boards.note_program(*board, task, &program)?;
+                boards.note_program(timing.rack(), *board, task, &program)?;
                 timing.set_program(task, &program);
             }
         }
@@ -258,8 +259,8 @@ impl<'f> Boards<'f> {
         }
     }
 
-    /// Remembers the program of a task; an error where the task is not that board's.
-    pub fn note_program(&mut self, board: BoardId, task: u16, program: &[Op]) -> Result<(), RunError> {
+    /// Remembers the program of a task; an error where the task is not that board's, or the rack cannot carry it out.
+    pub fn note_program(&mut self, rack: &Rack, board: BoardId, task: u16, program: &[Op]) -> Result<(), RunError> {
         if self.of_task.get(usize::from(task)) != Some(&board) {
             return Err(RunError::BadAnswer {
                 board: board.name(),
@@ -268,16 +269,34 @@ impl<'f> Boards<'f> {
             });
         }
         self.longest[usize::from(task)][0] = program.to_vec();
-        Ok(())
+        self.check_job(rack, task, &[])
     }
 
-    /// Remembers the longest rest that a task's board has asked for.
-    pub fn note_rest(&mut self, task: u16, rest: &[Op]) {
+    /// Remembers the longest rest that a task's board has asked for; an error where the rack cannot carry it out.
+    pub fn note_rest(&mut self, rack: &Rack, task: u16, rest: &[Op]) -> Result<(), RunError> {
+        if self.longest[usize::from(task)][1] == rest {
+            return Ok(());
+        }
+        self.check_job(rack, task, rest)?;
         let longest = &mut self.longest[usize::from(task)][1];
         if demand(rest) > demand(longest) {
             longest.clear();
             longest.extend_from_slice(rest);
         }
+        Ok(())
+    }
+
+    /// Whether the rack can carry out a job of the task's program and this rest.
+    fn check_job(&self, rack: &Rack, task: u16, rest: &[Op]) -> Result<(), RunError> {
+        let [program, _] = &self.longest[usize::from(task)];
+        if rest.len() > MAX_OPS || program.len() > MAX_OPS || rest.contains(&Op::Decide) {
+            return Err(RunError::BadAnswer {
+                board: self.of_task[usize::from(task)].name(),
+                what: format!("a program of more than {MAX_OPS} operations, or one that decides twice"),
+                when: at(self.reached),
+            });
+        }
+        Ok(rack.check_program(usize::from(task), &[program.as_slice(), rest].concat())?)
     }
 
     /// Sorts the transfers of a window by the board that they are made to; those that failed go to the one that asked, too.
@@ -499,7 +518,7 @@ impl<'f> Boards<'f> {
 /// Processor time, then accesses: which of two programs asks for more.
 fn demand(program: &[Op]) -> (Ns, usize) {
     let execution = program.iter().map(|op| if let Op::Exec(ns) = op { *ns } else { 0 });
-    (execution.sum(), program.iter().filter(|op| matches!(op, Op::Access(_))).count())
+    (execution.fold(0, Ns::saturating_add), program.iter().filter(|op| matches!(op, Op::Access(_))).count())
 }
 
 /// The transfers that the data plane carries out.

@@ -205,7 +205,7 @@ impl Boards<'_> {
             self.transfers[*board as usize].clear();
             let answer = self.ask(&self.grant_of(*board, now, now, flags::BOOT))?;
             for (task, program) in answer.programs {
-                self.note_program(*board, task, &program)?;
+                self.note_program(timing.rack(), *board, task, &program)?;
                 timing.set_program(task, &program);
             }
             let event = Event::new(now, EventKind::BoardUp, Severity::Ok, f64::from(*board as u8), 0.0);

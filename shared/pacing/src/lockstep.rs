@@ -351,11 +351,11 @@ impl<'f> Lockstep<'f> {
         if let (Some(task), Some(rest)) = (window.decides(), answer.rest)
             && self.boards.of_task[usize::from(task)] == board
         {
-            self.boards.note_rest(task, &rest);
+            self.boards.note_rest(self.timing.rack(), task, &rest)?;
             self.rest[usize::from(task)] = rest;
         }
         for (task, program) in answer.programs {
-            self.boards.note_program(board, task, &program)?;
+            self.boards.note_program(self.timing.rack(), board, task, &program)?;
             programs.push((task, program));
         }
         Ok(())

@@ -289,12 +289,12 @@ impl<'f> Realtime<'f> {
         let task = self.plan.task_of(window).filter(|task| self.boards.of_task[usize::from(*task)] == board);
         if let Some(task) = task {
             if let Some(rest) = &answer.rest {
-                self.boards.note_rest(task, rest);
+                self.boards.note_rest(self.plan.timing().rack(), task, rest)?;
             }
             self.plan.decided(window, task, answer.rest);
         }
         for (task, program) in answer.programs {
-            self.boards.note_program(board, task, &program)?;
+            self.boards.note_program(self.plan.timing().rack(), board, task, &program)?;
             self.plan.set_program(task, &program);
         }
         Ok(task.is_some())

@@ -13,7 +13,7 @@ const BUFFER: usize = 256;
 /// Transfers of a grant, operations of a reply: longer messages allocate once.
 const LENGTH: usize = 64;
 /// No board has a longer program.
-const MAX_OPS: usize = 4096;
+pub(crate) const MAX_OPS: usize = 4096;
 
 /// Spans in a message: it is worth sending with half of them; longer ones allocate once.
 const SPANS: usize = 64;

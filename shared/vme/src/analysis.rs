@@ -431,7 +431,7 @@ impl Analysis<'_> {
         let tasks = &wiring.tasks_of_processor[p as usize];
         let at = tasks.iter().position(|&other| other as usize == t)?;
         let mut own = self.job(t, programs)?;
-        let late = rack.tasks[t].overrun == Overrun::Late;
+        let late = rack.tasks[t].overrun == Some(Overrun::Late);
         if late && matches!(rack.tasks[t].release, Release::Interrupt(_)) {
             // two releases whose handlers ran late may stand before this one
             own *= 3;

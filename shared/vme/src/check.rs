@@ -2,7 +2,7 @@
 //!
 //! [`Rack::checked`] fills in what may be left out (cards that only a task names) and refuses what no
 //! chassis could hold. [`Rack::check_program`] refuses a program whose accesses the boards cannot
-//! answer, or that cannot fit its period even alone on the bus.
+//! answer, or that cannot fit its period even alone on the bus, unless the task says what an overrun does.
 
 use crate::Ns;
 use crate::arbiter::{LEVELS, Mode, SLOTS};
@@ -10,6 +10,9 @@ use crate::cycle::{self, Misfit};
 use crate::processor::Processor;
 use crate::program::{Access, Direction, Op, Width};
 use crate::rack::{Rack, Release, Slave, Task};
+
+/// A job that lasts longer overruns by no policy: it is a mistake.
+const MOST_PERIODS: u64 = 1000;
 
 /// What is wrong with a rack or a program.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -57,7 +60,9 @@ pub enum RackError {
     NotMapped { master: String, adaptor: String, addr: u32 },
     #[error("`{master}` transfers {n} cycles from {addr:#x}, beyond the window of `{slave}`")]
     BeyondWindow { master: String, addr: u32, n: u32, slave: String },
-    #[error("program of task `{task}` needs {need_ns} ns on `{processor}`, its period is {period_ns} ns")]
+    #[error(
+        "program of task `{task}` needs {need_ns} ns on `{processor}`, its period is {period_ns} ns; a task that is to overrun says what comes of it (overrun = \"skip\", \"late\" or \"trip\")"
+    )]
     ProgramTooLong { task: String, processor: String, need_ns: Ns, period_ns: Ns },
     #[error("the rack has {n} {what}, {limit} at most are modelled")]
     TooMany { what: &'static str, n: usize, limit: usize },
@@ -366,7 +371,8 @@ impl Rack {
     }
 
     /// Whether a job of these operations (before and after its decision) can be carried out at all:
-    /// boards answer each access, and alone on the bus it ends within its period.
+    /// boards answer each access, and alone on the bus it ends within its period, or, where the task says what an overrun
+    /// does, within [`MOST_PERIODS`] of them.
     pub fn check_program(&self, task: usize, ops: &[Op]) -> Result<(), RackError> {
         let spec = &self.tasks[task];
         let processor = self.processor_of(spec);
@@ -384,10 +390,14 @@ impl Rack {
                     let cycles: Ns = plan.bursts(&self.bus, access.addr, 0).map(|burst| burst.done_ns).sum();
                     need_ns = need_ns.saturating_add(cycles + stall);
                 }
+                Op::Raise(level) if !(1..=7).contains(level) => {
+                    return Err(RackError::IrqOutOfRange { interrupter: spec.name.clone(), level: *level });
+                }
                 Op::Raise(_) | Op::Decide => {}
             }
         }
-        if need_ns > spec.period_ns {
+        let periods = if spec.overrun.is_some() { MOST_PERIODS } else { 1 };
+        if need_ns > spec.period_ns.saturating_mul(periods) {
             let (task, processor) = (spec.name.clone(), spec.processor.clone());
             return Err(RackError::ProgramTooLong { task, processor, need_ns, period_ns: spec.period_ns });
         }

@@ -148,9 +148,10 @@ pub struct Task {
     /// What releases a job.
     #[serde(default)]
     pub release: Release,
-    /// What happens to a release while the job before still runs.
-    #[serde(default)]
-    pub overrun: Overrun,
+    /// What happens to a release while the job before still runs; `skip` where it is not stated. A task that states it may
+    /// have jobs that need more than its period even alone on the bus; any other is refused then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub overrun: Option<Overrun>,
     /// How often an access that ended in BERR* is tried again at once.
     #[serde(default)]
     pub retries: u8,

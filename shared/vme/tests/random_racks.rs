@@ -88,7 +88,7 @@ fn random_rack(draw: &mut Draw) -> (Rack, Vec<Vec<Op>>) {
             period_ns: draw.from(100_000, 600_000),
             offset_ns: draw.from(0, 100_000),
             priority: draw.from(0, 3) as u8,
-            overrun: draw.pick(&[Overrun::Skip, Overrun::Late]),
+            overrun: Some(draw.pick(&[Overrun::Skip, Overrun::Late])),
             ..Task::default()
         };
         if draw.chance(25) {

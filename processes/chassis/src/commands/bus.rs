@@ -47,6 +47,10 @@ fn show_scenario(name: &str) -> miette::Result<u8> {
     let rehearsed = rack_run::rehearse(&scenario);
     let (programs, account) = match &rehearsed {
         Ok((programs, account)) => (programs.as_slice(), Some(account)),
+        Err(error) if rack_run::is_of_the_scenario(error) => {
+            eprintln!("error: {error}");
+            return Ok(2);
+        }
         Err(reason) => {
             eprintln!("warning: no bus programs: {reason}");
             (&[][..], None)

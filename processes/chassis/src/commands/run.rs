@@ -69,13 +69,17 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
             return Err(refused("--pacing", "realtime", "crashes and hangs are planned, expected lock step").into());
         }
     }
-    let folder = out_folder(args.out.as_deref(), &document.name)?;
     end_on_signals()?;
     for (variant, scenario) in &variants {
         for warning in scenario::warnings(scenario) {
             eprintln!("warning: variant {}: {warning}", variant.name);
         }
+        if let Err(error) = rack_run::check(scenario) {
+            eprintln!("error: variant {}: {error}", variant.name);
+            return Ok(2);
+        }
     }
+    let folder = out_folder(args.out.as_deref(), &document.name)?;
 
     let mut results = Vec::new();
     let (mut failed, mut losses) = (false, false);
@@ -90,6 +94,9 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
         let mut result = finished.result;
         if let Some(error) = &finished.error {
             eprintln!("error: variant {}: {error}", variant.name);
+            if rack_run::is_of_the_scenario(error) {
+                return Ok(2);
+            }
             failed = true;
         }
         for loss in &finished.losses {

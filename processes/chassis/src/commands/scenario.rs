@@ -1,5 +1,6 @@
 //! `vmerack scenario`: check a scenario, or show it resolved.
 
+use crate::rack_run;
 use clap::{Args, Subcommand};
 use miette::IntoDiagnostic;
 
@@ -33,6 +34,10 @@ pub fn run(args: ScenarioArgs) -> miette::Result<u8> {
             for (variant, resolved) in &variants {
                 for warning in scenario::warnings(resolved) {
                     eprintln!("warning: variant {}: {warning}", variant.name);
+                }
+                if let Err(error) = rack_run::check(resolved) {
+                    eprintln!("error: variant {}: {error}", variant.name);
+                    return Ok(2);
                 }
             }
             println!("{scenario}: ok, {} variant(s), {:.1} s each", variants.len(), document.scenario()?.duration());

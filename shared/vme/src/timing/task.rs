@@ -192,7 +192,7 @@ impl Timing {
             State::Halted => return None,
             State::Polling { .. } | State::Active | State::Deciding => {}
         }
-        match self.wiring.rack.tasks[t as usize].overrun {
+        match self.wiring.rack.tasks[t as usize].overrun.unwrap_or_default() {
             Overrun::Late if task.backlog.len() < BACKLOG => task.backlog.push((job, self.now)),
             Overrun::Trip => {
                 task.skipped += 1;

@@ -160,7 +160,7 @@ fn a_stalled_processor_is_busy_and_does_not_switch_tasks() {
 fn overruns_skip_finish_late_or_trip_as_stated() {
     for (overrun, jobs) in [(Overrun::Skip, vec![0, 2, 4]), (Overrun::Late, vec![0, 1, 2, 3])] {
         let mut rack = rack(vec![task("control", "cpu", 0, 1000)]);
-        rack.tasks[0].overrun = overrun;
+        rack.tasks[0].overrun = Some(overrun);
         let mut timing = Timing::new(rack).unwrap();
         timing.set_program(0, &[Op::Exec(1200)]);
         let log = run(&mut timing, 5_900);
@@ -169,7 +169,7 @@ fn overruns_skip_finish_late_or_trip_as_stated() {
         assert_eq!(timing.skipped(0), if overrun == Overrun::Skip { 3 } else { 0 });
     }
     let mut rack = rack(vec![task("control", "cpu", 0, 1000)]);
-    rack.tasks[0].overrun = Overrun::Trip;
+    rack.tasks[0].overrun = Some(Overrun::Trip);
     let mut timing = Timing::new(rack).unwrap();
     timing.set_program(0, &[Op::Exec(1200)]);
     assert_eq!(timing.advance(9_000, &mut Log::default()), Stop::Overrun { task: 0, job: 1 });

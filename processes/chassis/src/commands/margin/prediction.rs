@@ -167,7 +167,7 @@ fn sampling_to_torque_s(scenario: &Scenario) -> Result<f64, String> {
         way: None,
     };
     let end = JOBS * (control_period_s(scenario) * 1e9) as Ns;
-    listen(scenario, end, &mut observer)?;
+    listen(scenario, end, &mut observer).map_err(|error| error.to_string())?;
     observer.way.map(|way| way as f64 * 1e-9).ok_or_else(|| "no control job reached the D/A".into())
 }
 

@@ -16,7 +16,7 @@ use messages::{AmplifierCommand, Event, EventKind, Ns, PlantProbe, PlantSample, 
 use nalgebra::Vector3;
 use scenario::{Integrator, Scenario};
 
-/// Most amplifier commands that may wait for their time.
+/// Most amplifier commands that may wait for their time; of more, which only outputs gone wrong send, the oldest are lost.
 const PENDING: usize = 256;
 
 /// The hardware of the rack.
@@ -250,6 +250,7 @@ impl HwSim {
 impl Board for HwSim {
     fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
         self.pending.extend_from_slice(&inputs.mail.amplifier);
+        self.pending.drain(..self.pending.len().saturating_sub(PENDING));
         if inputs.boot {
             self.actuate();
             self.sample(out);

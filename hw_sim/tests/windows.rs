@@ -142,3 +142,15 @@ fn the_sensor_carries_the_tools_weight_and_the_contact() {
     assert!((wrench[2] - (20.0 - weight)).abs() < 1e-9);
     assert_eq!(bench.out.mail.events[0].kind, EventKind::FirstContact as u32);
 }
+
+#[test]
+fn commands_whose_time_never_comes_do_not_pile_up() {
+    let mut bench = Bench::new(&scenario(&[]));
+    let memory = allocation_counter::measure(|| {
+        let never = [free(u64::MAX, [0.0; 7]); 1000];
+        for k in 1..100 {
+            bench.window(k * 100_000, &never);
+        }
+    });
+    assert!(memory.bytes_max < 1 << 20, "{} bytes", memory.bytes_max);
+}

@@ -14,7 +14,12 @@ impl Draw {
 
     /// A whole number below `n`.
     pub fn below(&mut self, n: usize) -> usize {
-        (self.0.next_u64() % n as u64) as usize
+        (self.next() % n as u64) as usize
+    }
+
+    /// Any number.
+    pub fn next(&mut self) -> u64 {
+        self.0.next_u64()
     }
 
     /// Puts the items in a random order.

@@ -10,6 +10,7 @@
 mod bench;
 mod draw;
 mod fault_row;
+mod fuzz;
 mod machine;
 mod programs;
 mod running;
@@ -17,6 +18,7 @@ mod running;
 pub use bench::{Bench, Edit};
 pub use draw::Draw;
 pub use fault_row::{FaultRow, fault};
+pub use fuzz::{fuzz, spoil, spoil_file};
 pub use machine::{Process, Signal, signal};
 pub use programs::{program, target_folder, workspace};
 pub use running::{Outcome, Running};

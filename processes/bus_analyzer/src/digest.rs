@@ -1,4 +1,4 @@
-//! The digest: SHA-256 over all messages of channels outside `/wall/`.
+//! The digest: SHA-256 over all messages of channels outside `/wall/`, here of messages as they come.
 //!
 //! Messages are ordered by (simulated time, channel name, sequence). Each goes into the hash as
 //! `name(channel) name(schema) u64(simulated time, ns) u32(sequence) data`, integers little-endian, where
@@ -6,13 +6,9 @@
 //! Simulated time is the producer's (`publish_time`). Attachments, metadata, seed, compression and the
 //! order in the file do not count. The digest of no message is that of the empty string.
 
-use crate::topics::{Topic, WALL};
+use crate::topics::Topic;
 use messages::Ns;
 use sha2::{Digest as _, Sha256};
-use std::collections::BTreeMap;
-use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
 
 /// Digest of messages as they come. All messages of a window's time must come before the step after
 /// the next begins; within that they come in any order.
@@ -95,7 +91,8 @@ fn hash_message(hash: &mut Sha256, message: &Message, bytes: &[u8]) {
     );
 }
 
-fn add(hash: &mut Sha256, channel: &str, schema: &str, t: Ns, sequence: u32, cdr: &[u8]) {
+/// Adds a message to the hash.
+pub(crate) fn add(hash: &mut Sha256, channel: &str, schema: &str, t: Ns, sequence: u32, cdr: &[u8]) {
     for name in [channel, schema] {
         hash.update((name.len() as u32).to_le_bytes());
         hash.update(name);
@@ -106,70 +103,10 @@ fn add(hash: &mut Sha256, channel: &str, schema: &str, t: Ns, sequence: u32, cdr
     hash.update(cdr);
 }
 
-fn hexadecimal(hash: Sha256) -> String {
+/// The hash in words.
+pub(crate) fn hexadecimal(hash: Sha256) -> String {
     hash.finalize()
         .iter()
         .map(|byte| format!("{byte:02x}"))
         .collect()
-}
-
-/// Why a file has no digest.
-#[derive(Debug, thiserror::Error)]
-pub enum DigestError {
-    /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
-    Read {
-        /// Which file.
-        path: PathBuf,
-        /// What the operating system said.
-        source: io::Error,
-    },
-    /// It is no whole MCAP file.
-    #[error("{}: not a whole MCAP file: {source} (a truncated record is made whole by `vmerack log recover`)", path.display())]
-    Damaged {
-        /// Which file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: mcap::McapError,
-    },
-}
-
-/// Digest of a record, in hexadecimal. All its messages are held in memory.
-pub fn digest_file(path: &Path) -> Result<String, DigestError> {
-    let file = fs::read(path).map_err(|source| DigestError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    digest_bytes(&file).map_err(|source| DigestError::Damaged {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-fn digest_bytes(file: &[u8]) -> mcap::McapResult<String> {
-    let validated = mcap::read::Options::ValidateChunkCrcs;
-    let stream = mcap::read::MessageStream::new_with_options(file, validated.into())?;
-    let mut messages = BTreeMap::new();
-    for (position, message) in stream.enumerate() {
-        let message = message?;
-        if !message.channel.topic.starts_with(WALL) {
-            let key = (
-                message.publish_time,
-                message.channel.topic.clone(),
-                message.sequence,
-                position,
-            );
-            messages.insert(key, message);
-        }
-    }
-    let mut hash = Sha256::new();
-    for ((t, topic, sequence, _), message) in &messages {
-        let schema = message
-            .channel
-            .schema
-            .as_ref()
-            .map_or("", |schema| schema.name.as_str());
-        add(&mut hash, topic, schema, *t, *sequence, &message.data);
-    }
-    Ok(hexadecimal(hash))
 }

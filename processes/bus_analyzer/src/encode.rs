@@ -151,7 +151,7 @@ pub fn master_use(cdr: &mut Cdr, used: &MasterUse, name: &str) {
 pub fn latency(cdr: &mut Cdr, path: &SensorPath) {
     header(cdr, path.t, "");
     cdr.u32(path.job);
-    cdr.u64(path.t - path.felt);
+    cdr.u64(path.t.saturating_sub(path.felt));
     for part in path.parts {
         cdr.u64(part);
     }

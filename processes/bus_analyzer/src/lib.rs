@@ -11,6 +11,8 @@ mod board;
 pub mod cdr;
 pub mod digest;
 pub mod encode;
+mod file_digest;
+mod reading;
 pub mod record;
 pub mod recover;
 pub mod robot;
@@ -18,7 +20,7 @@ pub mod schema;
 pub mod topics;
 
 pub use board::BusAnalyzer;
-pub use digest::{DigestError, digest_file};
+pub use file_digest::{DigestError, digest_file};
 pub use record::Lost;
 pub use recover::{RecoverError, Recovered, recover};
 pub use topics::Topic;

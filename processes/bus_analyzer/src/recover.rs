@@ -3,20 +3,16 @@
 //! Chunks are taken whole or not at all (their CRC decides); a kill therefore loses the last chunk.
 //! Attachments and metadata are carried over.
 
+use crate::reading::{self, Raw, Records};
 use crate::record::{self, METADATA};
-use mcap::read::{ChunkReader, parse_record};
 use mcap::records::Record;
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError, Writer};
 use messages::Ns;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-
-/// No record of ours is longer; a length beyond it is damage.
-const LONGEST_RECORD: usize = 256 << 20;
 
 /// Why a record cannot be recovered.
 #[derive(Debug, thiserror::Error)]
@@ -118,7 +114,7 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovered, RecoverError> {
         path: input.to_owned(),
         source,
     };
-    let mut file = File::open(input).map_err(unreadable)?;
+    let file = reading::open(input).map_err(unreadable)?;
     if let (Ok(from), Ok(to)) = (input.canonicalize(), output.canonicalize())
         && from == to
     {
@@ -132,50 +128,34 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovered, RecoverError> {
         source,
     };
 
-    let mut reader = LinearReader::new_with_options(
-        LinearReaderOptions::default()
-            .with_emit_chunks(true)
-            .with_skip_end_magic(true)
-            .with_record_length_limit(LONGEST_RECORD),
-    );
     let mut copy: Option<Copy> = None;
     let mut good = 0; // end of the last whole record
-    loop {
-        let event = match reader.next_event() {
-            None => break,
-            Some(Ok(event)) => event,
-            Some(Err(source)) if copy.is_none() => {
+    for raw in Records::of_file(file, true) {
+        let raw = match raw {
+            Ok(raw) => raw,
+            Err(McapError::Io(source)) => return Err(unreadable(source)),
+            Err(source) if copy.is_none() => {
                 return Err(RecoverError::NoRecord {
                     path: input.to_owned(),
                     source,
                 });
             }
-            Some(Err(_)) => break,
+            Err(_) => break,
         };
-        match event {
-            LinearReadEvent::ReadRequest(need) => {
-                let read = file.read(reader.insert(need)).map_err(unreadable)?;
-                reader.notify_read(read);
+        let Ok(record) = raw.parse() else { break };
+        good += raw.len();
+        match (record, &mut copy) {
+            (Record::Header(_), None) => {
+                copy = Some(Copy::new(output).map_err(unwritable)?);
+                good += mcap::MAGIC.len() as u64;
             }
-            LinearReadEvent::Record { data, opcode } => {
-                let length = data.len() as u64 + 9;
-                let Ok(record) = parse_record(opcode, data) else {
-                    break;
-                };
-                good += length;
-                match (record, &mut copy) {
-                    (Record::Header(_), None) => {
-                        copy = Some(Copy::new(output).map_err(unwritable)?);
-                        good += mcap::MAGIC.len() as u64;
-                    }
-                    (Record::DataEnd(_), Some(copy)) => {
-                        copy.recovered.was_complete = true;
-                        break;
-                    }
-                    (record, Some(copy)) => copy.take(record).map_err(unwritable)?,
-                    (_, None) => break,
-                }
+            (Record::DataEnd(_), Some(copy)) => {
+                copy.recovered.was_complete = true;
+                break;
             }
+            (Record::Chunk { .. }, Some(copy)) => copy.take_chunk(&raw).map_err(unwritable)?,
+            (record, Some(copy)) => copy.take(record).map_err(unwritable)?,
+            (_, None) => break,
         }
     }
     let Some(mut copy) = copy else {
@@ -207,6 +187,16 @@ impl Copy {
             topics: BTreeMap::new(),
             next_sequence: BTreeMap::new(),
         })
+    }
+
+    /// All of a chunk, or nothing where it is damaged.
+    fn take_chunk(&mut self, chunk: &Raw) -> mcap::McapResult<()> {
+        let is_sound = |raw: mcap::McapResult<Raw>| raw.is_ok_and(|raw| raw.parse().is_ok());
+        if !chunk.records().all(is_sound) {
+            self.recovered.damaged_chunks += 1;
+            return Ok(());
+        }
+        chunk.records().try_for_each(|record| self.take(record?.parse()?))
     }
 
     fn take(&mut self, record: Record) -> mcap::McapResult<()> {
@@ -246,18 +236,6 @@ impl Copy {
                         u64::from(header.sequence - expected);
                 }
             }
-            Record::Chunk { header, data } => {
-                let records: mcap::McapResult<Vec<Record>> =
-                    ChunkReader::new(header, &data).and_then(|records| records.collect());
-                match records {
-                    // a chunk holds no chunk
-                    Ok(records) => records
-                        .into_iter()
-                        .filter(|record| !matches!(record, Record::Chunk { .. }))
-                        .try_for_each(|record| self.take(record))?,
-                    Err(_) => self.recovered.damaged_chunks += 1,
-                }
-            }
             Record::Attachment { header, data, .. } => self.writer.attach(&Attachment {
                 log_time: header.log_time,
                 create_time: header.create_time,
@@ -274,7 +252,8 @@ impl Copy {
                 }
                 self.writer.write_metadata(&metadata)?;
             }
-            // indexes are made anew; a message of a channel that was never announced cannot be read by anyone
+            // indexes are made anew; a message of a channel that was never announced cannot be read by anyone, and a chunk
+            // holds no chunk
             _ => {}
         }
         Ok(())

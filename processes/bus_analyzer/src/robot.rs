@@ -16,7 +16,7 @@ pub fn describe(scenario: &Scenario) -> Result<Description, String> {
         (Robot::Rediestro, _) => arm::ArmModel::rediestro_urdf().to_owned(),
         (Robot::Slide, _) => slide_urdf(scenario.controller_arm()?.joint_names()),
         (Robot::Urdf, Some(file)) => {
-            std::fs::read_to_string(file).map_err(|error| format!("{file}: {error}"))?
+            scenario::read_text(file, scenario::URDF_LIMIT).map_err(|error| format!("{file}: {error}"))?
         }
         (Robot::Urdf, None) => return Err("robot = \"urdf\" needs the key arm.urdf".into()),
     };

@@ -129,6 +129,24 @@ fn the_digest_of_a_run_is_that_of_its_file() {
 }
 
 #[test]
+fn neither_order_nor_chunks_nor_compression_of_a_file_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, other) = (folder.path().join("a.mcap"), folder.path().join("b.mcap"));
+    // more than a block of messages
+    let digest = record(&path, 120, |_, _| ());
+    let bytes = std::fs::read(&path).unwrap();
+    let mut messages: Vec<_> = mcap::MessageStream::new(&bytes).unwrap().collect::<Result<_, _>>().unwrap();
+    messages.reverse();
+    let options = mcap::WriteOptions::new().compression(None).chunk_size(Some(1000)).calculate_chunk_crcs(false);
+    let mut writer = options.create(std::fs::File::create(&other).unwrap()).unwrap();
+    for message in &messages {
+        writer.write(message).unwrap();
+    }
+    writer.finish().unwrap();
+    assert_eq!(digest_file(&other).unwrap(), digest);
+}
+
+#[test]
 fn two_records_of_the_same_run_are_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let paths = [folder.path().join("a.mcap"), folder.path().join("b.mcap")];

@@ -138,7 +138,7 @@ impl ControlComputer {
         if let End::SecondCard { card, .. } = &mut self.end {
             card.served(transfer);
         }
-        let end = transfer.addr + transfer.n * transfer.access().width.bytes();
+        let end = transfer.addr.wrapping_add(transfer.n.wrapping_mul(transfer.access().width.bytes()));
         if transfer.is_read() {
             if transfer.addr == self.program.telemetry && transfer.is_ok() {
                 self.console.1 = Some(transfer.data_at);

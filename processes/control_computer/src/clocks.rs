@@ -9,6 +9,8 @@ use vme::Ns;
 
 /// Jobs over which the least lag is taken.
 const WINDOW: u32 = 20;
+/// A stamp that is further off is no clock's, ns: one hour.
+const FAR: Ns = 3_600_000_000_000;
 /// Cards that stamp.
 const CARDS: usize = 3;
 
@@ -50,8 +52,8 @@ impl Clocks {
     /// of a window in which a clock was found wrong and set: its drift since it was right, parts per million.
     pub fn compare(&mut self, now: Ns, stamps: [Option<Ns>; CARDS]) -> Option<f64> {
         for (card, stamp) in self.cards.iter_mut().zip(stamps) {
-            if let Some(stamp) = stamp {
-                let lag = now as i64 - stamp as i64 - card.behind;
+            if let Some(stamp) = stamp.filter(|stamp| now.abs_diff(*stamp) < FAR) {
+                let lag = now.wrapping_sub(stamp) as i64 - card.behind;
                 card.least = Some(card.least.map_or(lag, |least| least.min(lag)));
             }
         }
@@ -82,6 +84,17 @@ impl Clocks {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stamps_that_no_clock_has_are_not_compared() {
+        let mut clocks = Clocks::new(&scenario::Safety::default());
+        for job in 0..200 {
+            let now = 5_000_000 * job;
+            let stamps = [Some(u64::MAX), Some(1 << 63), Some((1 << 63) - 1 + job)];
+            assert_eq!(clocks.compare(now, stamps), None);
+            assert_eq!(clocks.corrected(now), now);
+        }
+    }
 
     /// Jobs of 5 ms for 4 s; the own clock and the cards' gain so many ppm from 1 s on. When a clock is found wrong, and its
     /// drift; and how far the own clock is off at the end.

@@ -10,7 +10,7 @@ use scenario::{FaultKind, Progress, Scenario, Schedule, Site, nanoseconds};
 
 /// Shortest time for which the supply holds after ACFAIL*, ms (VMEbus standard).
 const HOLD_UP_MS: f64 = 4.0;
-/// Words and signal changes that may wait without a new allocation.
+/// Words and signal changes that may wait; of more, which only a peer gone wrong sends, the oldest are forgotten.
 const PENDING: usize = 256;
 
 /// Two D/A cards and the parallel I/O card.
@@ -50,13 +50,13 @@ impl State {
             };
             match self.words.iter_mut().find(|w| same(w)) {
                 Some(known) => *known = *word,
-                None => self.words.push(*word),
+                None => push_bounded(&mut self.words, *word),
             }
         }
         for sample in &inputs.mail.plant {
             if sample.status != self.last_signal {
                 self.last_signal = sample.status;
-                self.signals.push((sample.t, sample.status));
+                push_bounded(&mut self.signals, (sample.t, sample.status));
             }
         }
     }
@@ -94,9 +94,7 @@ impl DaIo {
             return;
         }
         if transfer.is_read() {
-            let width = transfer.access().width.bytes();
-            for cycle in 0..transfer.n {
-                let addr = transfer.addr + cycle * width;
+            for addr in transfer.cycles() {
                 let value = self
                     .addresses
                     .register(addr)
@@ -166,9 +164,10 @@ impl Board for DaIo {
                 .signals
                 .first()
                 .map_or(Ns::MAX, |signal| signal.0.max(inputs.from));
+            // no transfer of a window takes place after it
             let transfer = transfers
                 .peek()
-                .map_or(Ns::MAX, |transfer| transfer.data_at);
+                .map_or(Ns::MAX, |transfer| transfer.data_at.min(inputs.until));
             let timer = self.state.cards.next_timer();
             let fault = self.schedule.next_change(&self.state.progress);
             let t = signal.min(transfer).min(timer).min(fault);
@@ -184,7 +183,7 @@ impl Board for DaIo {
                 self.state.cards.signals(t, status, &mut out.mail.events);
             } else if transfer == t {
                 if let Some(transfer) = transfers.next() {
-                    self.transfer(transfer, out);
+                    self.transfer(&TransferRecord { data_at: t, ..*transfer }, out);
                 }
             } else {
                 self.state.cards.timer(t, &mut out.mail.events);
@@ -195,6 +194,13 @@ impl Board for DaIo {
             }
         }
     }
+}
+
+fn push_bounded<T>(waiting: &mut Vec<T>, item: T) {
+    if waiting.len() == PENDING {
+        waiting.remove(0);
+    }
+    waiting.push(item);
 }
 
 /// Outputs that change twice at one instant are one command.

@@ -219,3 +219,30 @@ fn a_window_run_again_starts_from_the_state_at_its_start() {
     );
     assert_eq!(rest[1].volts[..2], first[1].volts[..2]);
 }
+
+#[test]
+fn a_transfer_dated_after_its_window_takes_place_at_its_end_and_the_watchdog_still_runs() {
+    let mut bench = Bench::powered();
+    let (da_1, io) = (bench.da_1, bench.io);
+    bench.write(u64::MAX - 1, da_1 + da::code(0), 4095);
+    let commands = bench.window(17 * MS);
+    assert_eq!(commands.iter().map(|command| command.t).collect::<Vec<_>>(), [17 * MS]);
+    bench.write(17 * MS + 5, io + parallel::WATCHDOG, 2);
+    assert!(bench.window(18 * MS).is_empty(), "{:?}", bench.out.mail.amplifier);
+    bench.window(60 * MS);
+    assert!(bench.events().contains(&(EventKind::WatchdogExpired as u32)));
+}
+
+#[test]
+fn words_and_signals_that_nobody_fetches_do_not_pile_up() {
+    let mut bench = Bench::powered();
+    let memory = allocation_counter::measure(|| {
+        for k in 0..20_000_u32 {
+            let word = BusWord { t: 0, addr: k, value: 0, job: u32::MAX, task: TASK, index: 0 };
+            bench.inputs.mail.words.push(word);
+            bench.signal(u64::MAX, k);
+            bench.step(17 * MS);
+        }
+    });
+    assert!(memory.bytes_max < 64 << 10, "{} bytes", memory.bytes_max);
+}

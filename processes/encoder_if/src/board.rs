@@ -152,17 +152,11 @@ impl Board for EncoderIf {
             self.history.push(sample);
         }
         for transfer in inputs.transfers.iter().filter(|transfer| transfer.is_ok()) {
-            let bytes = transfer.access().width.bytes();
-            let TransferRecord {
-                data_at: t,
-                job,
-                task,
-                index,
-                ..
-            } = *transfer;
+            let TransferRecord { data_at, job, task, index, .. } = *transfer;
+            // no transfer of a window takes place after it
+            let t = data_at.min(inputs.until);
             self.advance_faults(t, &mut out.mail.events);
-            for cycle in 0..transfer.n {
-                let addr = transfer.addr.wrapping_add(cycle * bytes);
+            for addr in transfer.cycles() {
                 if transfer.is_read() {
                     let value = self.content(addr, t);
                     out.mail.words.push(BusWord {

@@ -1,13 +1,17 @@
 //! What the shafts did lately: positions and speeds at the arm's steps, linear between them.
 //!
 //! Kept for as long as the speed estimator and a delay look back. Before the first sample the shafts are taken
-//! to have stood still there. More samples than planned for cost an allocation, nothing else.
+//! to have stood still there. More samples than planned for cost an allocation, nothing else; of far more, which only an
+//! arm whose clock runs away sends, the oldest are forgotten.
 
 use arm::drives::DriveData;
 use core::f64::consts::TAU;
 use messages::{JOINTS, PlantSample};
 use std::collections::VecDeque;
 use vme::Ns;
+
+/// No stated delay or window reaches back further.
+const MOST_SAMPLES: usize = 1 << 16;
 
 /// One value per joint.
 pub type PerJoint = [f64; JOINTS];
@@ -57,6 +61,9 @@ impl History {
         let t = sample.t as f64;
         if self.samples.back().is_some_and(|newest| t <= newest.t) {
             return;
+        }
+        if self.samples.len() == MOST_SAMPLES {
+            self.samples.pop_front();
         }
         let in_counts = |rad: &PerJoint| core::array::from_fn(|i| rad[i] * self.counts_per_rad[i]);
         self.samples.push_back(Shafts {

@@ -32,7 +32,8 @@ pub fn edge_time(history: &History, joint: usize, t: f64, window: f64) -> f64 {
     };
     let speed = (last.line - first.line) / (last.t - first.t);
     let bound = 1.0 / (t - last.t);
-    speed.clamp(-bound, bound) * 1e9
+    // angles that are no numbers have no order, and give no speed
+    speed.max(-bound).min(bound) * 1e9
 }
 
 /// First edge after `t`.

@@ -275,3 +275,28 @@ proptest! {
         prop_assert_eq!(pieces, whole);
     }
 }
+
+#[test]
+fn shafts_whose_angles_are_no_numbers_have_no_speed_and_break_nothing() {
+    let mut bench = Bench::new(&scenario(&[]), |t| if t > 0.05 { f64::NAN } else { 3000.0 * t });
+    assert!((bench.speed(49_000_000) - 3000.0).abs() <= LSB);
+    for t in [50_500_000, 51_000_000, 65_000_000, 90_000_000] {
+        let speed = bench.speed(t);
+        assert!(speed.abs() <= 3000.0 + LSB, "{speed}");
+    }
+}
+
+#[test]
+fn transfers_of_absurd_length_and_date_end_within_their_window() {
+    let mut cards = encoder_if::EncoderIf::new(&scenario(&[])).unwrap();
+    let mut inputs = board::Inputs { boot: true, until: MS, ..Default::default() };
+    inputs.mail.plant.push(bytemuck::Zeroable::zeroed());
+    for data_at in [u64::MAX, 0] {
+        let addr = scenario(&[]).card_base("encoder-1").unwrap();
+        inputs.transfers.push(messages::TransferRecord { data_at, addr, n: u32::MAX, ..bytemuck::Zeroable::zeroed() });
+    }
+    let mut out = board::Outputs::default();
+    board::Board::step(&mut cards, MS, &inputs, &mut out);
+    assert!(out.mail.words.iter().all(|word| word.t <= MS));
+    assert!(out.mail.words.len() < 10_000, "{}", out.mail.words.len());
+}

@@ -35,6 +35,8 @@ pub struct ForceSensorIf {
     faults: Faults,
     /// Offset registers: added to every sample.
     offset: Counts,
+    /// Number of the first sample after power-up.
+    first: u64,
     sampler: Option<Sampler>,
     delay: Option<DelayLine>,
     cascade: Cascade,
@@ -80,6 +82,7 @@ impl ForceSensorIf {
             gauges: Gauges::new(scenario),
             faults: Faults::new(scenario),
             offset: [0.0; AXES],
+            first: 0,
             sampler: None,
             delay,
             cascade: Cascade::settled([0.0; AXES]),
@@ -90,7 +93,7 @@ impl ForceSensorIf {
     /// Takes every sample due up to `until`.
     fn sample_until(&mut self, until: Ns, plant: &[PlantSample], events: &mut Vec<Event>) {
         loop {
-            let k = self.sampler.map_or(0, |newest| newest.k + 1);
+            let k = self.sampler.map_or(self.first, |newest| newest.k + 1);
             if k * SAMPLE_NS > until {
                 return;
             }
@@ -212,9 +215,7 @@ impl ForceSensorIf {
     }
 
     fn transfer(&mut self, transfer: &TransferRecord, plant: &[PlantSample], out: &mut Mail) {
-        let bytes = transfer.access().width.bytes();
-        for cycle in 0..transfer.n {
-            let addr = transfer.addr.wrapping_add(cycle * bytes);
+        for addr in transfer.cycles() {
             let register = self.word.register(addr.wrapping_sub(self.base));
             if transfer.is_read() {
                 if transfer.is_ok() {
@@ -247,11 +248,17 @@ impl ForceSensorIf {
 impl Board for ForceSensorIf {
     fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
         let plant = inputs.mail.plant.as_slice();
+        if self.sampler.is_none() {
+            // powered up, perhaps in the middle of a run
+            self.first = inputs.from.div_ceil(SAMPLE_NS);
+        }
         self.wires.rewind();
         self.post(&inputs.mail);
         for transfer in &inputs.transfers {
-            self.sample_until(transfer.data_at, plant, &mut out.mail.events);
-            self.transfer(transfer, plant, &mut out.mail);
+            // no transfer of a window takes place after it
+            let data_at = transfer.data_at.min(inputs.until);
+            self.sample_until(data_at, plant, &mut out.mail.events);
+            self.transfer(&TransferRecord { data_at, ..*transfer }, plant, &mut out.mail);
         }
         self.sample_until(inputs.until, plant, &mut out.mail.events);
         self.wires.keep(plant);
@@ -290,7 +297,7 @@ impl Wires {
             plant.get(self.next),
         );
         match (before, after) {
-            (Some(a), Some(b)) if b.t > t => {
+            (Some(a), Some(b)) if a.t <= t && t < b.t => {
                 let share = (t - a.t) as f64 / (b.t - a.t) as f64;
                 Some(core::array::from_fn(|i| {
                     a.wrench[i] + share * (b.wrench[i] - a.wrench[i])

@@ -12,7 +12,7 @@ pub struct DelayLine {
     delay: Ns,
     /// Sample k at k modulo the length.
     samples: Vec<Counts>,
-    newest: u64,
+    newest: Option<u64>,
 }
 
 impl DelayLine {
@@ -22,14 +22,17 @@ impl DelayLine {
         DelayLine {
             delay,
             samples: vec![[0.0; AXES]; length as usize],
-            newest: 0,
+            newest: None,
         }
     }
 
     /// Takes in 8 kHz sample number `k`.
     pub fn push(&mut self, k: u64, sample: Counts) {
+        if self.newest.is_none() {
+            self.samples.fill(sample);
+        }
         *self.slot(k) = sample;
-        self.newest = k;
+        self.newest = Some(k);
     }
 
     /// Number of the newest sample whose time is at or before t − d; 0 before the first.
@@ -46,7 +49,7 @@ impl DelayLine {
         if since == 0 {
             return from;
         }
-        let (to, span) = if k < self.newest {
+        let (to, span) = if self.newest.is_some_and(|newest| k < newest) {
             (self.samples[self.index(k + 1)], SAMPLE_NS)
         } else {
             (now, t - k * SAMPLE_NS)

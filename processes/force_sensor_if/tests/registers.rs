@@ -307,3 +307,33 @@ proptest! {
         prop_assert_eq!(pieces, whole);
     }
 }
+
+#[test]
+fn accesses_in_no_order_or_dated_far_ahead_are_answered_within_their_window() {
+    for filter in ["force_sensor_if.filter={ cascade = 0 }", "force_sensor_if.filter={ delay_ms = 3.0 }"] {
+        let mut bench = Bench::new(&scenario(&[filter]), |t| z(100.0 * t));
+        bench.run(5 * MS);
+        let fz = force::filter(0) + FZ;
+        let at = [9 * MS + 1, 5 * MS, u64::MAX, 0, 7 * MS + 3];
+        let words: Vec<u64> = bench.window(10 * MS, &at.map(|t| read(t, fz))).iter().map(|word| word.t).collect();
+        assert_eq!(words, [9 * MS + 1, 5 * MS, 10 * MS, 0, 7 * MS + 3]);
+        bench.run(20 * MS);
+    }
+}
+
+#[test]
+fn a_card_that_is_powered_up_late_samples_from_then_on() {
+    // a sample each 125 µs of the years before would take hours
+    let hours = 3_600_000 * MS;
+    let mut card = force_sensor_if::ForceSensorIf::new(&scenario(&["force_sensor_if.filter={ delay_ms = 3.0 }"])).unwrap();
+    let mut inputs = board::Inputs { boot: true, from: 10_000 * hours, until: 10_000 * hours, ..Default::default() };
+    let sample = messages::PlantSample { t: inputs.from, wrench: z(100.0), ..bytemuck::Zeroable::zeroed() };
+    inputs.mail.plant.push(sample);
+    let mut transfer: messages::TransferRecord = bytemuck::Zeroable::zeroed();
+    transfer.addr = scenario(&[]).card_base("force-sensor").unwrap() + force::filter(0) + FZ;
+    (transfer.data_at, transfer.n, transfer.width) = (inputs.from, 1, 1);
+    inputs.transfers.push(transfer);
+    let mut out = board::Outputs::default();
+    board::Board::step(&mut card, inputs.until, &inputs, &mut out);
+    assert_eq!(out.mail.words[0].value, (100.0 * PER_N) as u32, "what was before the first sample is like it");
+}

@@ -101,7 +101,7 @@ impl Sender {
     pub fn acknowledge(&mut self, accepted: u32) {
         let acknowledge = CommandKind::Acknowledge as u32;
         let Some(model) = self.plan.first() else { return };
-        self.begin_anew(vec![Command { epoch: accepted + 1, kind: acknowledge, start: 0, ..*model }]);
+        self.begin_anew(vec![Command { epoch: accepted.wrapping_add(1), kind: acknowledge, start: 0, ..*model }]);
     }
 
     /// Has the task go on with this segment from `start` on: it and those behind it last as long as planned.
@@ -109,13 +109,13 @@ impl Sender {
         let left = self.plan.iter().skip_while(|command| command.segment != segment);
         let planned = left.clone().next().map_or(0, |first| first.start);
         let moved = |t: Ns| t - planned + start;
-        let again = |(epoch, command): (u32, &Command)| Command {
-            epoch,
+        let again = |(further, command): (u32, &Command)| Command {
+            epoch: accepted.wrapping_add(further),
             start: moved(command.start),
             end: moved(command.end),
             ..*command
         };
-        let commands = (accepted + 1..).zip(left).map(again).collect();
+        let commands = (1..).zip(left).map(again).collect();
         self.begin_anew(commands);
     }
 
@@ -138,10 +138,10 @@ impl Sender {
         wrong.position[2] += step;
         wrong.epoch = match self.commands.get(self.sent) {
             Some(next) => next.epoch,
-            None => model.epoch + 1,
+            None => model.epoch.wrapping_add(1),
         };
         self.commands.insert(self.sent, wrong);
-        self.commands[self.sent + 1..].iter_mut().for_each(|command| command.epoch += 1);
+        self.commands[self.sent + 1..].iter_mut().for_each(|command| command.epoch = command.epoch.wrapping_add(1));
     }
 
     fn settle(&mut self, settled: usize) {
@@ -184,6 +184,19 @@ mod tests {
         assert_eq!(times, [(4, 10 * SECOND, 12 * SECOND), (5, 14 * SECOND, 16 * SECOND)]);
         assert_eq!(sender.poll(9 * SECOND, Some(3)).send, (0, 1));
         assert_eq!(sender.poll(12 * SECOND, Some(4)).send, (1, 2));
+    }
+
+    #[test]
+    fn an_epoch_at_the_end_of_its_range_breaks_nothing() {
+        let mut sender = Sender::new(commands(&[0, 3, 7]), 2 * SECOND);
+        for accepted in [u32::MAX, u32::MAX - 1] {
+            sender.acknowledge(accepted);
+            sender.go_on_with(0, SECOND, accepted);
+            for t in 0..20 {
+                sender.poll(t * SECOND, Some(accepted));
+            }
+            sender.interpose(20 * SECOND, 0.1);
+        }
     }
 
     fn nothing() -> Poll {

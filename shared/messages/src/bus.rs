@@ -57,6 +57,9 @@ pub struct TransferRecord {
     pub reserved: [u8; 2],
 }
 
+/// No transfer to a card that answers register by register has more cycles.
+const MOST_CYCLES: u32 = 1 << 12;
+
 impl From<&Transfer> for TransferRecord {
     fn from(transfer: &Transfer) -> Self {
         TransferRecord {
@@ -99,6 +102,13 @@ impl TransferRecord {
     /// True where a slave answered.
     pub fn is_ok(&self) -> bool {
         self.status == 0
+    }
+
+    /// Byte address of each cycle. A transfer that claims more cycles than any card has registers, or goes beyond the end
+    /// of the address space, is noise: it ends there.
+    pub fn cycles(&self) -> impl Iterator<Item = u32> + use<> {
+        let (addr, bytes) = (self.addr, self.access().width.bytes());
+        (0..self.n.min(MOST_CYCLES)).map_while(move |cycle| addr.checked_add(cycle * bytes))
     }
 
     /// The access that was asked for.
@@ -146,5 +156,13 @@ mod tests {
         assert_eq!(record.access(), access);
         assert!(!record.is_ok());
         assert_eq!((record.requested, record.granted, record.data_at, record.done), (4, 5, 6, 7));
+        assert_eq!(record.cycles().collect::<Vec<_>>(), [0x1234, 0x1236, 0x1238]);
+    }
+
+    #[test]
+    fn a_transfer_of_absurd_length_ends_with_the_address_space_or_the_largest_card() {
+        let absurd = |addr| TransferRecord { addr, n: u32::MAX, width: 2, ..bytemuck::Zeroable::zeroed() };
+        assert_eq!(absurd(u32::MAX - 7).cycles().collect::<Vec<_>>(), [u32::MAX - 7, u32::MAX - 3]);
+        assert_eq!(absurd(0).cycles().count(), MOST_CYCLES as usize);
     }
 }

@@ -7,7 +7,7 @@ use crate::{Context, RunError};
 use board::routes::ROUTES;
 use board::{Board, BoardId, Decision, Inputs, Mail, Ns, Op, Outputs};
 use channels::{Exchange, Inboxes, wall_ns};
-use messages::{Grant, Kind, Span, TransferRecord, flags};
+use messages::{BOARDS, Grant, Kind, Span, TransferRecord, flags};
 
 /// Builds the board of that role.
 pub type Factory<'a> = &'a dyn Fn(BoardId, &Context) -> Result<Box<dyn Board>, String>;
@@ -40,7 +40,14 @@ pub struct Host {
     outputs: Outputs,
     /// What is measured, where anything is, and whether on the wall clock.
     measured: Option<(Acts, bool)>,
+    /// Last window of each board.
+    windows: [(Ns, Ns); BOARDS.len()],
 }
+
+/// Longest window, and longest time between two of a board on the wires: bounds the work of a step.
+const LONGEST: Ns = 1_000_000_000;
+/// No run lasts until then (36 years): a board may add to a time without a look at its range.
+const LATEST: Ns = 1 << 60;
 
 impl Host {
     /// Builds the boards `here` with `factory`.
@@ -60,7 +67,8 @@ impl Host {
             .collect::<Result<_, _>>()?;
         let (inputs, outputs) = Default::default();
         let clocks = Clocks::new(&context.scenario);
-        Ok(Host { boards, exchange, clocks, inboxes: Box::default(), inputs, outputs, measured: None })
+        let windows = [(0, 0); BOARDS.len()];
+        Ok(Host { boards, exchange, clocks, inboxes: Box::default(), inputs, outputs, measured: None, windows })
     }
 
     /// Drops these boards as a killed process drops them: nothing is flushed, nothing said.
@@ -76,6 +84,7 @@ impl Host {
             let board = factory(*id, context).map_err(|reason| RunError::Board { board: id.name(), reason })?;
             self.inboxes[*id as usize].clear();
             self.exchange.renew(*id);
+            self.windows[*id as usize] = (0, 0);
             self.boards.push((*id, board));
         }
         Ok(())
@@ -135,6 +144,19 @@ impl Host {
                 when: crate::error::at(grant.until),
             });
         };
+        if !self.follows(id, grant) {
+            let (from, until) = self.windows[id as usize];
+            return Err(RunError::BadAnswer {
+                board: "chassis",
+                what: format!(
+                    "a grant from {} to {} ns for `{}`, whose last window was {from} to {until} ns",
+                    grant.from,
+                    grant.until,
+                    id.name()
+                ),
+                when: crate::error::at(until),
+            });
+        }
         let inputs = &mut self.inputs;
         inputs.from = grant.from;
         inputs.until = grant.until;
@@ -163,6 +185,9 @@ impl Host {
             stamped.for_each(|word| word.t = self.clocks.show(id, word.t));
         }
         self.exchange.deliver(id, grant.until, &self.outputs.mail, &mut self.inboxes)?;
+        // an arm that stopped early stands there
+        let stands = self.outputs.early.map_or(grant.until, |early| early.clamp(grant.from, grant.until));
+        self.windows[id as usize] = (grant.from, stands);
         let end = clock(&self.measured);
         if let Some((acts, _)) = &mut self.measured {
             acts.stepped(id, grant, &self.inputs, &self.outputs, begin, end);
@@ -174,6 +199,22 @@ impl Host {
             rest: self.outputs.rest.take(),
             programs: std::mem::take(&mut self.outputs.programs),
         })
+    }
+
+    /// Whether a board can carry on with this window: time goes forwards, but for a window that `da_io` runs again, and
+    /// no further at once than a board's work is bounded.
+    fn follows(&self, board: BoardId, grant: &Grant) -> bool {
+        let (from, until) = self.windows[board as usize];
+        let again = board == BoardId::DaIo && grant.flags & flags::RERUN != 0;
+        let earliest = if again { from } else { until };
+        let on_the_wires =
+            matches!(board, BoardId::DaIo | BoardId::HwSim | BoardId::ForceSensorIf | BoardId::EncoderIf);
+        // a card that is powered up again begins at any time; the arm has been there from the start
+        let first = until == 0 && board != BoardId::HwSim;
+        grant.until <= LATEST
+            && (earliest..=grant.until).contains(&grant.from)
+            && grant.until - grant.from <= LONGEST
+            && (first || !on_the_wires || grant.from - earliest <= LONGEST)
     }
 
     /// Sends mail in the chassis' own name.

@@ -205,8 +205,42 @@ fn holes(scenario: &Scenario) -> Result {
     Ok(())
 }
 
+/// Longest time that a rack may have: the longest run.
+const LONGEST_NS: i64 = 36_000_000_000_000;
+/// What a rack does by itself, without a job, does not happen more often.
+const SHORTEST_NS: vme::Ns = 100;
+
+/// Every time in the rack, whatever it is of, is one that sums of a run can be made of.
+fn times(key: &str, value: &toml::Value) -> Result {
+    match value {
+        toml::Value::Table(table) => table.iter().try_for_each(|(name, value)| times(&format!("{key}.{name}"), value)),
+        toml::Value::Array(list) => (0..).zip(list).try_for_each(|(i, value): (usize, _)| times(&format!("{key}.{i}"), value)),
+        toml::Value::Integer(ns) if key.ends_with("_ns") && !(0..=LONGEST_NS).contains(ns) => {
+            Err(Problem::new(key, format!("is {ns}, expected 0 to {LONGEST_NS}")))
+        }
+        _ => Ok(()),
+    }
+}
+
 fn rack(scenario: &Scenario) -> Result {
     let rack = &scenario.rack;
+    let tree = toml::Value::try_from(rack).map_err(|error| Problem::new("rack", error.to_string()))?;
+    times("rack", &tree)?;
+    let often = |key: String, ns: vme::Ns| match ns {
+        0..SHORTEST_NS => Err(Problem::new(key, format!("is {ns}, expected {SHORTEST_NS} or more"))),
+        _ => Ok(()),
+    };
+    for (i, traffic) in rack.traffic.iter().enumerate() {
+        often(format!("rack.traffic.{i}.period_ns"), traffic.period_ns)?;
+    }
+    for (i, interrupter) in rack.interrupters.iter().enumerate() {
+        interrupter.ticks.map_or(Ok(()), |ticks| often(format!("rack.interrupters.{i}.ticks.period_ns"), ticks.period_ns))?;
+    }
+    for (i, task) in rack.tasks.iter().enumerate() {
+        if let vme::rack::Release::Poll(poll) = &task.release {
+            often(format!("rack.tasks.{i}.release.poll.interval_ns"), poll.interval_ns)?;
+        }
+    }
     for (i, task) in rack.tasks.iter().enumerate() {
         if task.period_ns < vme::MICROSECOND * 10 {
             return Err(Problem::new(format!("rack.tasks.{i}.period_ns"), format!("is {}, expected 10000 or more", task.period_ns)));

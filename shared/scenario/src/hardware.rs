@@ -1,9 +1,15 @@
 //! The objects that a scenario describes: arms, drives, frames, times.
 
+use crate::file::read_text;
 use crate::model::{Robot, Scenario};
 use arm::drives::DriveData;
 use arm::{ArmModel, JointVector, Mismatch, Pose, rotation};
 use nalgebra::{Matrix3, Vector3};
+
+/// A URDF of more bytes is not read.
+pub const URDF_LIMIT: u64 = 32 << 20;
+/// Neither is a file of drive data.
+const DRIVES_LIMIT: u64 = 1 << 20;
 
 impl Scenario {
     /// The arm as the controller knows it. The message names the file and what is wrong with it.
@@ -16,7 +22,7 @@ impl Scenario {
                 let (Some(file), Some(tip)) = (&self.arm.urdf, &self.arm.tip_link) else {
                     return Err("robot = \"urdf\" needs the keys arm.urdf and arm.tip_link".into());
                 };
-                let xml = std::fs::read_to_string(file).map_err(|error| format!("{file}: {error}"))?;
+                let xml = read_text(file, URDF_LIMIT).map_err(|error| format!("{file}: {error}"))?;
                 ArmModel::from_urdf(&xml, self.arm.base_link.as_deref(), tip)
                     .map_err(|error| format!("{file}: {error}"))?
             }
@@ -54,7 +60,7 @@ impl Scenario {
             }
             None => Ok(DriveData::rediestro()),
             Some(file) => {
-                let text = std::fs::read_to_string(file).map_err(|error| format!("{file}: {error}"))?;
+                let text = read_text(file, DRIVES_LIMIT).map_err(|error| format!("{file}: {error}"))?;
                 DriveData::from_toml(&text).map_err(|error| format!("{file}: {error}"))
             }
         }

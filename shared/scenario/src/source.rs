@@ -1,6 +1,7 @@
 //! A TOML text whose errors show file, line and key.
 
 use crate::error::{Problem, ScenarioError};
+use crate::file::read_text;
 use miette::{NamedSource, SourceSpan};
 use serde::de::DeserializeOwned;
 use std::ops::Range;
@@ -25,16 +26,8 @@ impl Source {
 
     /// Reads a file.
     pub fn read(path: &str) -> Result<Source, ScenarioError> {
-        let unreadable = |reason: String| ScenarioError::Read { name: path.to_owned(), reason };
-        let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
-        if size > MAX_BYTES {
-            return Err(unreadable(format!(
-                "it has {size} bytes; a scenario is a text file of at most {MAX_BYTES} bytes"
-            )));
-        }
-        let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
-        let text = String::from_utf8(bytes)
-            .map_err(|error| unreadable(format!("byte {} is not UTF-8 text", error.utf8_error().valid_up_to())))?;
+        let text = read_text(path, MAX_BYTES)
+            .map_err(|reason| ScenarioError::Read { name: path.to_owned(), reason })?;
         Ok(Source { file: path.to_owned(), text })
     }
 

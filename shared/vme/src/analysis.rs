@@ -24,6 +24,8 @@ use crate::traffic::Arrivals;
 
 /// Windows beyond this are taken for unbounded.
 const HORIZON: Ns = 1 << 42;
+/// So are those that a bus with no time left creeps up to in more steps.
+const STEPS: u32 = 1 << 20;
 
 /// A stream of requests, in the order of a list of them: earlier ones are granted first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,8 +41,17 @@ pub struct Stream {
 impl Stream {
     /// Requests that can fall into a window of this length, both ends included.
     fn requests(&self, window: Ns) -> Ns {
-        (window + self.jitter_ns) / self.period_ns + 1
+        (window.saturating_add(self.jitter_ns) / self.period_ns).saturating_add(1)
     }
+}
+
+/// What these streams ask for in a window. A sum that no window holds stays the longest time there is.
+fn asked<'a>(streams: impl IntoIterator<Item = &'a Stream>, window: Ns) -> Ns {
+    sum(streams.into_iter().map(|s| s.requests(window).saturating_mul(s.service_ns)))
+}
+
+fn sum(times: impl IntoIterator<Item = Ns>) -> Ns {
+    times.into_iter().fold(0, Ns::saturating_add)
 }
 
 /// Longest time from request to end for stream `i` of `streams` (most urgent first) under PRI.
@@ -52,14 +63,13 @@ pub fn sporadic(streams: &[Stream], i: usize) -> Option<Ns> {
     if load > 1.0 {
         return None;
     }
-    let demand = |streams: &[Stream], window| streams.iter().map(|s| s.requests(window) * s.service_ns).sum::<Ns>();
     // ⌈(w + J)/T⌉ requests of every urgent enough stream: the level-i busy period
-    let busy = fixed_point(blocking + own.service_ns, |busy| blocking + demand(&streams[..=i], busy - 1))?;
+    let busy = fixed_point(blocking + own.service_ns, |busy| sum([blocking, asked(&streams[..=i], busy - 1)]))?;
     let requests = (busy + own.jitter_ns).div_ceil(own.period_ns);
     let mut worst = 0;
     for q in 0..requests {
         let before = blocking + q * own.service_ns;
-        let begins = fixed_point(before, |begins| before + demand(higher, begins))?;
+        let begins = fixed_point(before, |begins| sum([before, asked(higher, begins)]))?;
         let arrival = (q * own.period_ns).saturating_sub(own.jitter_ns);
         worst = worst.max((begins + own.service_ns).saturating_sub(arrival));
     }
@@ -69,7 +79,10 @@ pub fn sporadic(streams: &[Stream], i: usize) -> Option<Ns> {
 /// The least fixed point of a growing function at or above `start`; none within the horizon.
 fn fixed_point(start: Ns, f: impl Fn(Ns) -> Ns) -> Option<Ns> {
     let mut x = start;
-    while x < HORIZON {
+    for _ in 0..STEPS {
+        if x >= HORIZON {
+            break;
+        }
         let next = f(x).max(start);
         if next == x {
             return Some(x);
@@ -204,7 +217,7 @@ fn tenure(timing: &Timing, source: Source, access: &Access) -> Tenure {
     let arbitration = wiring.arbitration_ns(wiring.masters[master as usize].place.slot);
     let mut tenure = Tenure { total: 0, burst: 0, competes: 0 };
     for burst in wiring.plan(access, splits).bursts(&rack.bus, access.addr, pace) {
-        tenure.total += arbitration + burst.done_ns;
+        tenure.total = sum([tenure.total, arbitration, burst.done_ns]);
         tenure.burst = tenure.burst.max(arbitration + burst.done_ns);
         tenure.competes += 1;
     }
@@ -223,7 +236,7 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
         for access in accesses(&programs[t]) {
             tenures.extend((0..=task.retries).map(|_| tenure(timing, Source::Task(t), &access)));
         }
-        let service_ns = tenures.iter().map(|tenure| tenure.total).sum();
+        let service_ns = sum(tenures.iter().map(|tenure| tenure.total));
         // a job that ends before the next release: its accesses come up to a period late
         let stream =
             Some(Stream { service_ns, period_ns: task.period_ns, jitter_ns: task.period_ns + release_jitter(task) });
@@ -242,7 +255,7 @@ fn demands(timing: &Timing, programs: &[Vec<Op>]) -> Vec<Demand> {
         }
         let master = wiring.processors[wire.handler as usize].0;
         let accesses = service_tenures(timing, i);
-        let service_ns = accesses.iter().map(|tenure| tenure.total).sum();
+        let service_ns = sum(accesses.iter().map(|tenure| tenure.total));
         // one in service and one pending may be left from before the window
         let stream =
             spec.ticks.map(|ticks| Stream { service_ns, period_ns: ticks.period_ns, jitter_ns: 2 * ticks.period_ns });
@@ -338,7 +351,7 @@ impl Analysis<'_> {
         let others = masters.filter(|&other| other != master);
         // one transfer of each other client of the same requester may stand before it in the queue
         let queued = self.queued_before(master);
-        let total = own.total + queued.total;
+        let total = sum([own.total, queued.total]);
         let competes = own.competes + queued.competes;
         match self.mode() {
             Mode::Rrs => {
@@ -355,7 +368,7 @@ impl Analysis<'_> {
                     let level = &mut levels[place(other).level as usize];
                     *level = longest.max(*level);
                 }
-                Some(total + competes * levels.iter().sum::<Ns>())
+                Some(sum([total, competes.saturating_mul(sum(levels))]))
             }
             Mode::Pri | Mode::Sgl => {
                 let (higher, lower): (Vec<u16>, Vec<u16>) = others.partition(|&m| self.rank(m) < self.rank(master));
@@ -370,10 +383,8 @@ impl Analysis<'_> {
                     }
                     streams.push(demand.stream?);
                 }
-                let alone = total + competes * blocking;
-                fixed_point(alone, |window| {
-                    alone + streams.iter().map(|s| s.requests(window) * s.service_ns).sum::<Ns>()
-                })
+                let alone = sum([total, competes.saturating_mul(blocking)]);
+                fixed_point(alone, |window| sum([alone, asked(&streams, window)]))
             }
         }
     }
@@ -394,7 +405,7 @@ impl Analysis<'_> {
             competes: worst.competes.max(tenure.competes),
         });
         let before = clients.saturating_sub(1) as Ns;
-        Tenure { total: worst.total * before, burst: worst.burst, competes: worst.competes * before }
+        Tenure { total: worst.total.saturating_mul(before), burst: worst.burst, competes: worst.competes * before }
     }
 
     /// Time for which an access of task `t` stalls its processor.
@@ -408,7 +419,7 @@ impl Analysis<'_> {
             }
             None => rack.bus.read_stall_ns + rack.processors[p].posted_write_ns.unwrap_or(0),
         };
-        Some(self.access(Source::Task(t), access)? + beyond)
+        Some(sum([self.access(Source::Task(t), access)?, beyond]))
     }
 
     /// Processor time of one job of task `t`, stalls included.
@@ -417,10 +428,10 @@ impl Analysis<'_> {
         let switch = rack.processors[self.timing.wiring().processor_of_task[t] as usize].switch_ns;
         let tries = Ns::from(rack.tasks[t].retries) + 1;
         // it is switched to, and back from where it preempted
-        programs[t].iter().try_fold(2 * switch, |sum, op| match op {
-            Op::Exec(ns) => Some(sum + ns),
-            Op::Access(access) => Some(sum + tries * self.stall(t, access)?),
-            Op::Raise(_) | Op::Decide => Some(sum),
+        programs[t].iter().try_fold(2 * switch, |total, op| match op {
+            Op::Exec(ns) => Some(sum([total, *ns])),
+            Op::Access(access) => Some(sum([total, tries.saturating_mul(self.stall(t, access)?)])),
+            Op::Raise(_) | Op::Decide => Some(total),
         })
     }
 
@@ -434,7 +445,7 @@ impl Analysis<'_> {
         let late = rack.tasks[t].overrun == Some(Overrun::Late);
         if late && matches!(rack.tasks[t].release, Release::Interrupt(_)) {
             // two releases whose handlers ran late may stand before this one
-            own *= 3;
+            own = own.saturating_mul(3);
         }
         let mut interference = Vec::new();
         for &urgent in &tasks[..at] {
@@ -456,7 +467,7 @@ impl Analysis<'_> {
             if !spec.local {
                 let master = wiring.processors[p as usize].0;
                 for tenure in service_tenures(self.timing, i) {
-                    service_ns += self.bus(master, tenure)? + rack.bus.read_stall_ns;
+                    service_ns = sum([service_ns, self.bus(master, tenure)?, rack.bus.read_stall_ns]);
                 }
             }
             let period_ns = spec.ticks?.period_ns;
@@ -471,9 +482,8 @@ impl Analysis<'_> {
                 blocking = blocking.max(self.stall(lazy as usize, &look)?);
             }
         }
-        fixed_point(own + blocking, |window| {
-            own + blocking + interference.iter().map(|s| s.requests(window) * s.service_ns).sum::<Ns>()
-        })
+        let alone = sum([own, blocking]);
+        fixed_point(alone, |window| sum([alone, asked(&interference, window)]))
     }
 }
 
@@ -500,5 +510,15 @@ mod tests {
         let streams = [stream(600, 1000), stream(500, 1000)];
         assert_eq!(sporadic(&streams, 0), Some(600 + 499));
         assert_eq!(sporadic(&streams, 1), None);
+    }
+
+    #[test]
+    fn neither_a_bus_with_no_time_left_nor_one_for_absurd_requests_has_a_bound() {
+        // 100 ns of every 100 ns: each step of the busy period is as long as the one before
+        let full = [stream(99, 100), stream(1, 100)];
+        assert_eq!(sporadic(&full, 1), Some(100));
+        assert_eq!(fixed_point(100, |window| sum([100, asked(&full, window)])), None);
+        let absurd = [stream(Ns::MAX / 2, 100), stream(Ns::MAX / 2, 1)];
+        assert_eq!(fixed_point(1, |window| asked(&absurd, window)), None);
     }
 }

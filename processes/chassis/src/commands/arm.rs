@@ -8,7 +8,7 @@ mod eval;
 mod show;
 mod states;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use arm::ArmModel;
 use clap::{Args, Subcommand};
@@ -62,16 +62,11 @@ struct Source {
     base: Option<String>,
 }
 
-/// A URDF of more bytes than this is refused unread.
-const URDF_LIMIT: u64 = 32 << 20;
-
 /// Something wrong with what the user gave: exit code 2.
 #[derive(Debug, thiserror::Error)]
 enum BadInput {
     #[error("cannot read {file}: {error}")]
-    Unreadable { file: String, error: std::io::Error },
-    #[error("{file} has {bytes} bytes; a URDF of more than {URDF_LIMIT} is not read")]
-    TooLarge { file: String, bytes: u64 },
+    Unreadable { file: String, error: String },
     #[error("{file}: {error}")]
     Urdf { file: String, error: arm::UrdfError },
     #[error("{file}: line {line}: {what}")]
@@ -121,7 +116,13 @@ pub fn run(args: ArmArgs) -> miette::Result<u8> {
 
 fn model(source: &Source) -> Result<ArmModel, BadInput> {
     let (file, text) = match &source.urdf {
-        Some(path) => (path.display().to_string(), read_urdf(path)?),
+        Some(path) => {
+            let file = path.display().to_string();
+            match scenario::read_text(path, scenario::URDF_LIMIT) {
+                Ok(text) => (file, text),
+                Err(error) => return Err(BadInput::Unreadable { file, error }),
+            }
+        }
         None => (
             "built-in REDIESTRO".to_owned(),
             ArmModel::rediestro_urdf().to_owned(),
@@ -130,20 +131,4 @@ fn model(source: &Source) -> Result<ArmModel, BadInput> {
     let tip = source.tip.as_deref().unwrap_or("tool");
     ArmModel::from_urdf(&text, source.base.as_deref(), tip)
         .map_err(|error| BadInput::Urdf { file, error })
-}
-
-fn read_urdf(path: &Path) -> Result<String, BadInput> {
-    let file = || path.display().to_string();
-    let unreadable = |error| BadInput::Unreadable {
-        file: file(),
-        error,
-    };
-    let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
-    if bytes > URDF_LIMIT {
-        return Err(BadInput::TooLarge {
-            file: file(),
-            bytes,
-        });
-    }
-    std::fs::read_to_string(path).map_err(unreadable)
 }

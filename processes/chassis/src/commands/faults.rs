@@ -9,7 +9,7 @@ mod draw;
 mod effect;
 mod judge;
 mod null;
-mod plan;
+pub mod plan;
 mod watch;
 
 use crate::commands::run::end_on_signals;

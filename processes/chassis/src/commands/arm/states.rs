@@ -43,7 +43,7 @@ impl States<std::io::BufReader<std::fs::File>> {
         let name = path.display().to_string();
         match std::fs::File::open(path) {
             Ok(file) => Ok(States::new(std::io::BufReader::new(file), name)),
-            Err(error) => Err(BadInput::Unreadable { file: name, error }),
+            Err(error) => Err(BadInput::Unreadable { file: name, error: error.to_string() }),
         }
     }
 }
@@ -79,7 +79,7 @@ impl<R: BufRead> States<R> {
                 .read_until(b'\n', &mut self.text);
             let read = read.map_err(|error| BadInput::Unreadable {
                 file: self.file.clone(),
-                error,
+                error: error.to_string(),
             })?;
             if read == 0 {
                 return Ok(None);

@@ -48,6 +48,9 @@ impl Context {
     }
 }
 
+/// Names that are tried for a new folder.
+const ATTEMPTS: u64 = 100;
+
 /// A run's folder, held by one process of it.
 #[derive(Debug)]
 pub struct RunFolder {
@@ -71,19 +74,21 @@ impl RunFolder {
     /// Makes a new one, after removing those that nobody holds any more.
     pub fn create() -> Result<RunFolder, RunError> {
         let base = base();
-        std::fs::create_dir_all(&base).map_err(failed(&base))?;
         clean_stale();
         let time = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_nanos() as u64);
-        for attempt in 0..100_u64 {
+        for attempt in 0..ATTEMPTS {
             // unique together with the folder's creation: a taken name is tried again
             let id = base36(
                 time.wrapping_mul(31).wrapping_add(u64::from(std::process::id())).wrapping_add(attempt) % 36_u64.pow(7),
             );
             let path = base.join(&id);
-            match std::fs::create_dir(&path) {
-                Ok(()) => return RunFolder::join(&path),
-                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(failed(&path)(error)),
+            // another run that leaves may remove the folder of all runs at any moment, and one that starts may take a new
+            // folder without a lock on it for one that nobody holds
+            let made = std::fs::create_dir_all(&base).and_then(|()| std::fs::create_dir(&path));
+            match made.map_err(failed(&path)).and_then(|()| RunFolder::join(&path)) {
+                Ok(folder) if path.join("lock").exists() => return Ok(folder),
+                Err(error) if attempt == ATTEMPTS - 1 => return Err(error),
+                _ => {}
             }
         }
         Err(RunError::Folder { path: base.display().to_string(), reason: "no free name for a run folder".into() })
@@ -195,6 +200,20 @@ mod tests {
         assert!(path.exists(), "somebody still holds it");
         drop(second);
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn folders_are_made_whole_while_other_runs_come_and_go() {
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..200 {
+                        let folder = RunFolder::create().expect("folder");
+                        std::fs::write(folder.path.join("bells"), "").expect("it is there");
+                    }
+                });
+            }
+        });
     }
 
     #[test]

@@ -59,7 +59,8 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
         let seen = [EventKind::WatchdogExpired, EventKind::AmplifierTrip, EventKind::OverrunTrip];
         within(event.t) && (event.cause != 0 || seen.iter().any(|kind| event.kind == *kind as u32))
     };
-    let first = trace.events.iter().find(consequence);
+    // one that is known ahead, such as a time-out, may stand before earlier ones
+    let first = trace.events.iter().filter(consequence).min_by_key(|event| event.t);
     let states = trace.events.iter().filter(|event| event.kind == EventKind::SafetyState as u32);
     let at_begin = states.clone().take_while(|event| event.t < from).last();
     let mut states = states.filter(|event| within(event.t));

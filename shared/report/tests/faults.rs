@@ -54,6 +54,17 @@ fn cards_that_say_what_they_are_need_no_detector_beside_it() {
 }
 
 #[test]
+fn a_time_out_that_is_known_ahead_does_not_hide_what_fires_before_it() {
+    let result = result(&[
+        event(5000, EventKind::FaultInjected, 0.0, 0.0, None),
+        event(5020, EventKind::WatchdogExpired, 0.0, 0.0, None),
+        event(5003, EventKind::Detected, 0.0, 0.0, Some(Detector::BusError)),
+    ]);
+    assert_eq!(result.faults[0].detected_by.as_deref(), Some("bus-error"));
+    assert!((result.faults[0].detected_after_s.unwrap() - 0.003).abs() < 1e-9);
+}
+
+#[test]
 fn a_detector_that_fires_before_anything_was_injected_is_a_finding() {
     let trip = event(1250, EventKind::Detected, 0.0, 0.0, Some(Detector::EncoderJump));
     let result = result(&[trip, event(5000, EventKind::FaultInjected, 0.0, 0.0, None)]);

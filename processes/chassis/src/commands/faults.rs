@@ -10,6 +10,7 @@ mod effect;
 mod judge;
 mod null;
 pub mod plan;
+mod shows;
 mod watch;
 
 use crate::commands::run::end_on_signals;

@@ -3,6 +3,7 @@
 use super::draw::Draw;
 use super::effect::Difference;
 use super::plan::{Kind, Plan, State};
+use super::shows;
 use super::watch::{Seen, is_braked};
 use board::Ns;
 use messages::{Event, EventKind};
@@ -27,7 +28,7 @@ pub fn row(plan: &Plan, draw: &Draw, scenario: &Scenario, seen: &Seen, twin: &Se
         effect: false,
         detected_by: None,
         detected_after_ms: None,
-        bound_ms: kind.detect.of(fault.amount, period_ms),
+        bound_ms: kind.bound(&fault.target).of(fault.amount, period_ms),
         safe_after_ms: None,
         reaction: State::Run.name().into(),
         expected: if mildest == gravest {
@@ -46,6 +47,7 @@ pub fn row(plan: &Plan, draw: &Draw, scenario: &Scenario, seen: &Seen, twin: &Se
     // some faults begin with the next thing that they can befall
     let begun = nanoseconds_of(measured.injected_s);
     row.injected_s = measured.injected_s;
+    row.bound_ms += shows::after_ms(kind.bound(&fault.target), scenario, measured.fault, run, begun);
     row.effect = Difference::of(seen, twin, from).exceeds(&kind.effect.unwrap_or(plan.effect));
     row.detected_by = measured.detected_by;
     row.detected_after_ms = measured.detected_after_s.map(|after| 1e3 * after);

@@ -2,6 +2,7 @@
 
 use scenario::{Document, FaultKind, Problem, Scenario, ScenarioError, Source};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use toml::{Table, Value};
 
 /// The campaign that is run where no file is given.
@@ -118,6 +119,9 @@ pub struct Kind {
     pub before: Vec<Before>,
     /// How soon it must be detected.
     pub detect: Bound,
+    /// The same for single targets, in place of it.
+    #[serde(default)]
+    pub detect_at: BTreeMap<String, Bound>,
     /// Mildest and gravest state that passes.
     pub reaction: [State; 2],
     /// In place of the campaign's.
@@ -156,10 +160,41 @@ pub struct Bound {
     pub ms: f64,
     /// A fault that grows by its amount a second: the time that it takes to come to this.
     pub grows_to: Option<f64>,
+    /// A D/A output that stays: the time until a job asks for one so many steps of the converter away.
+    pub output_steps: Option<f64>,
+    /// Index marks that do not come: the time in which the motor turns so often.
+    pub motor_turns: Option<f64>,
+}
+
+impl Kind {
+    fn check_bound(&self, bound: &Bound) -> Result<(), Problem> {
+        let within = |key: &str, value: Option<f64>, most: f64| match value {
+            Some(value) if !(0.0..=most).contains(&value) => {
+                Err(Problem::new(key, format!("is {value}, expected 0 to {most}")))
+            }
+            _ => Ok(()),
+        };
+        within("periods", Some(bound.periods), 1e4)?;
+        within("ms", Some(bound.ms), 1e5)?;
+        within("output_steps", bound.output_steps, 1e6)?;
+        within("motor_turns", bound.motor_turns, 1e6)?;
+        let only = |key: &str, stated: bool, fits: bool, what: &str| match stated && !fits {
+            true => Err(Problem::new(key, format!("is stated for `{}`, expected {what}", self.kind.name()))),
+            false => Ok(()),
+        };
+        only("grows_to", bound.grows_to.is_some(), self.amount[0] > 0.0, "an amount above 0: the fault is to grow")?;
+        only("output_steps", bound.output_steps.is_some(), self.kind == FaultKind::DaStuck, "it for `da-stuck` alone")?;
+        only("motor_turns", bound.motor_turns.is_some(), self.kind == FaultKind::IndexLoss, "it for `index-loss` alone")
+    }
+
+    /// How soon a fault of this target must be detected.
+    pub fn bound(&self, target: &str) -> &Bound {
+        self.detect_at.get(target).unwrap_or(&self.detect)
+    }
 }
 
 impl Bound {
-    /// For a fault of that amount, ms.
+    /// For a fault of that amount that shows at once, ms.
     pub fn of(&self, amount: f64, period_ms: f64) -> f64 {
         self.periods * period_ms + self.ms + self.grows_to.map_or(0.0, |size| 1e3 * size / amount.abs())
     }
@@ -290,14 +325,18 @@ impl Plan {
             if let Some(watch) = kind.watch_s {
                 within(key("watch_s"), watch, 1e-3, 100.0)?;
             }
-            within(key("detect.periods"), kind.detect.periods, 0.0, 1e4)?;
-            within(key("detect.ms"), kind.detect.ms, 0.0, 1e5)?;
+            if let Some(unknown) = kind.detect_at.keys().find(|target| !kind.targets.contains(target)) {
+                let expected = format!("expected one of {}", kind.targets.join(", "));
+                return Err(Problem::new(key(&format!("detect_at.{unknown}")), expected));
+            }
+            let stated = kind.detect_at.iter().map(|(target, bound)| (format!("detect_at.{target}"), bound));
+            for (name, bound) in stated.chain([("detect".to_owned(), &kind.detect)]) {
+                kind.check_bound(bound)
+                    .map_err(|problem| Problem::new(key(&format!("{name}.{}", problem.key)), problem.message))?;
+            }
             if let Some([least, most]) = kind.in_period_ms {
                 within(key("in_period_ms.0"), least, 0.0, most)?;
                 within(key("in_period_ms.1"), most, least, super::judge::control_period_ms(scenario))?;
-            }
-            if kind.detect.grows_to.is_some() && kind.amount[0] <= 0.0 {
-                return Err(Problem::new(key("amount"), "expected more than 0: the fault is to grow"));
             }
             if kind.reaction[0] > kind.reaction[1] {
                 return Err(Problem::new(key("reaction"), "expected the mildest and the gravest state, in this order"));
@@ -382,7 +421,7 @@ mod tests {
 
     #[test]
     fn a_bound_adds_periods_time_and_the_time_in_which_a_drift_grows() {
-        let bound = Bound { periods: 3.0, ms: 100.0, grows_to: Some(30.0) };
+        let bound = Bound { periods: 3.0, ms: 100.0, grows_to: Some(30.0), ..Bound::default() };
         assert_eq!(bound.of(-60.0, 5.0), 15.0 + 100.0 + 500.0);
         assert_eq!(Bound { periods: 1.0, ..Bound::default() }.of(0.0, 5.0), 5.0);
     }

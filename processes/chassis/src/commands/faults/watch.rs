@@ -20,7 +20,7 @@ const ALL_BRAKES: u32 = drive_status::BRAKE_ENGAGED;
 pub struct Seen {
     /// Probes and events.
     pub trace: Trace,
-    /// When each transfer over the bus ended that a program made, ns.
+    /// When each transfer over the bus ended that a program made, repeated ones too, ns.
     pub transfers: Vec<Ns>,
 }
 
@@ -59,7 +59,8 @@ struct Watcher {
 impl Observer for Watcher {
     fn window(&mut self, until: Ns, mail: &Mail, log: &Log) -> Flow {
         self.seen.trace.window(&mail.plant_probe, &mail.control_probe, &mail.events);
-        let programs = log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program);
+        let of_programs = |origin| matches!(origin, Origin::Program | Origin::Repeat);
+        let programs = log.transfers.iter().filter(|transfer| of_programs(transfer.origin));
         self.seen.transfers.extend(programs.map(|transfer| transfer.done));
         let mut flow = Flow::Continue;
         for probe in &mail.plant_probe {

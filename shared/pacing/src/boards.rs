@@ -60,7 +60,7 @@ pub(crate) struct Boards<'f> {
     pub transfers: [Vec<TransferRecord>; BOARDS.len()],
     /// The faults that the chassis tells of.
     pub injections: Injections,
-    /// Planned faults of bus and processors; those behind them in the timing plane are boards that are down.
+    /// Planned faults of bus and processors; behind them in the timing plane is what other faults do to it.
     pub timing_faults: usize,
     /// Number of the window to be granted next.
     pub window: u64,
@@ -522,6 +522,11 @@ fn demand(program: &[Op]) -> (Ns, usize) {
 }
 
 /// The transfers that the data plane carries out.
-pub(crate) fn program_transfers(log: &Log) -> impl Iterator<Item = &Transfer> {
+fn program_transfers(log: &Log) -> impl Iterator<Item = &Transfer> {
     log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program)
+}
+
+/// The transfers that go to the record: those of programs, each time that they took place.
+pub(crate) fn recorded_transfers(log: &Log) -> impl Iterator<Item = &Transfer> {
+    log.transfers.iter().filter(|transfer| matches!(transfer.origin, Origin::Program | Origin::Repeat))
 }

@@ -5,7 +5,7 @@
 //! that instant); force sensor and encoders answer the reads made to them at *their* times; the board that decides at D is
 //! stepped with the values read. The recorder gets the same grants one way, with credit.
 
-use crate::boards::{Boards, program_transfers};
+use crate::boards::{Boards, recorded_transfers};
 use crate::error::at;
 use crate::holdback::take_until;
 use crate::host::{Answer, Factory};
@@ -227,7 +227,7 @@ impl<'f> Lockstep<'f> {
     fn look_ahead(&mut self, window: &mut Window, limit: Ns) {
         window.log.clear();
         window.stop = window.timing.advance(limit, &mut window.log);
-        // boards that are down have been told of, and this window began there
+        // boards that are down have been told of, and this window began there; messages and clocks are told of in any
         while let Stop::Fault { fault } = window.stop
             && usize::from(fault) >= self.boards.timing_faults
         {
@@ -299,7 +299,7 @@ impl<'f> Lockstep<'f> {
             self.own_mail.events.push(event);
         }
         observer.account(until, &window.log, &mut self.own_mail);
-        self.own_mail.transfers.extend(program_transfers(&window.log).map(TransferRecord::from));
+        self.own_mail.transfers.extend(recorded_transfers(&window.log).map(TransferRecord::from));
         self.boards.host.send(&self.own_mail)?;
         let grant = self.boards.grant_of(BoardId::BusAnalyzer, from, until, 0);
         self.boards.grant_recorder(&Grant { window: window.number, ..grant })?;

@@ -14,7 +14,7 @@ mod writes;
 pub(crate) use paced::Paced;
 pub use rights::ask as ask_for_rights;
 
-use crate::boards::{Boards, STALL, WATCH_PERIOD, program_transfers};
+use crate::boards::{Boards, STALL, WATCH_PERIOD, recorded_transfers};
 use crate::error::at;
 use crate::host::{Answer, Factory};
 use crate::{Context, Flow, Observer, RunError};
@@ -318,7 +318,7 @@ impl<'f> Realtime<'f> {
             self.own_mail.clear();
             self.own_mail.events.append(&mut self.boards.life.mail.events);
             self.boards.injections.tell(until, &mut self.own_mail.events);
-            self.own_mail.transfers.extend(program_transfers(&log).map(TransferRecord::from));
+            self.own_mail.transfers.extend(recorded_transfers(&log).map(TransferRecord::from));
             self.own_mail.events.extend(trips.iter().map(|(at, task, job)| {
                 let (job, task) = ((*job).into(), (*task).into());
                 Event::new(*at, EventKind::OverrunTrip, Severity::Error, job, task)

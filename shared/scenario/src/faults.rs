@@ -79,18 +79,49 @@ impl Scenario {
         self.faults.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The faults that the timing plane has to know: first those of bus and processors, so many, then boards that are down.
+    /// The faults that the timing plane has to know: first those of bus and processors, so many, then what messages that
+    /// come twice, clocks that drift and boards that are down do to them.
     pub fn fault_plan(&self) -> (vme::FaultPlan, usize) {
-        let mut plan = vme::FaultPlan::default();
+        let (mut planned, mut caused) = (Vec::new(), Vec::new());
         for Occurrence { fault, from, until } in self.occurrences() {
-            // a target that does not exist has been refused
-            if let Ok(Site::Timing(kind)) = self.fault_site(fault) {
-                plan.faults.push(vme::Fault { from_ns: from, until_ns: until, kind });
+            let holds = |kind| vme::Fault { from_ns: from, until_ns: until, kind };
+            match self.fault_site(fault) {
+                Ok(Site::Timing(kind)) => planned.push(holds(kind)),
+                Ok(Site::Messages(board)) if self.faults[fault].kind == FaultKind::Duplicate => {
+                    caused.extend(self.repeated_accesses(board).into_iter().map(holds));
+                }
+                Ok(Site::Board(board)) if self.faults[fault].kind == FaultKind::ClockDrift => {
+                    let gain_ppb = (self.faults[fault].amount * 1e3).round() as i64;
+                    let drift = |timer| holds(vme::FaultKind::Drift { timer, gain_ppb });
+                    caused.extend(self.timers(board).into_iter().map(drift));
+                }
+                // a target that does not exist has been refused
+                _ => {}
             }
         }
-        let planned = plan.faults.len();
-        plan.faults.extend(self.outage_faults());
-        (plan, planned)
+        let first = planned.len();
+        planned.extend(caused);
+        planned.extend(self.outage_faults());
+        (vme::FaultPlan { faults: planned }, first)
+    }
+
+    /// The accesses that carry this board's messages over the bus, twice each: reads of its slaves, writes of its tasks.
+    fn repeated_accesses(&self, board: BoardId) -> Vec<vme::FaultKind> {
+        let own = |name: &String| *name == board.name();
+        let slaves = self.rack.slaves.iter().enumerate().filter(|(_, slave)| own(&slave.board));
+        let tasks = self.rack.tasks.iter().enumerate().filter(|(_, task)| own(&task.board));
+        let reads = slaves.map(|(slave, _)| vme::FaultKind::RepeatedRead(slave as u16));
+        reads.chain(tasks.map(|(task, _)| vme::FaultKind::RepeatedWrite(task as u16))).collect()
+    }
+
+    /// What ticks by this board's clock: the timers of its tasks, and the events of its cards.
+    fn timers(&self, board: BoardId) -> Vec<vme::Timer> {
+        let rack = &self.rack;
+        let is_own = |card: &str| rack.slaves.iter().any(|slave| slave.card() == card && slave.board == board.name());
+        let tasks = rack.tasks.iter().enumerate().filter(|(_, task)| task.board == board.name());
+        let interrupters = rack.interrupters.iter().enumerate().filter(|(_, interrupter)| is_own(&interrupter.card));
+        let of_tasks = tasks.map(|(task, _)| vme::Timer::Task(task as u16));
+        of_tasks.chain(interrupters.map(|(i, _)| vme::Timer::Interrupter(i as u16))).collect()
     }
 
     /// Where a fault acts. The problem names what its kind befalls.

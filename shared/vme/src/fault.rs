@@ -5,6 +5,9 @@
 
 use crate::Ns;
 
+/// Rounds in which a drifting clock is inverted.
+const INVERSIONS: u32 = 40;
+
 /// A fault and when it holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
@@ -30,6 +33,17 @@ pub enum FaultKind {
     LostInterrupt(u16),
     /// The cable of this adaptor is out.
     CableOut(u16),
+    /// Reads of this slave window take place twice: the master misses the first one's end.
+    RepeatedRead(u16),
+    /// Writes of this task take place twice.
+    RepeatedWrite(u16),
+    /// The clock behind this timer gains: its ticks come early, or late where it loses.
+    Drift {
+        /// The timer.
+        timer: Timer,
+        /// Parts per billion, above −10⁹.
+        gain_ppb: i64,
+    },
     /// Transfers over the link of this adaptor fail its parity check: BERR*.
     Parity(u16),
     /// Execution times of this task are multiplied by `percent`/100.
@@ -50,6 +64,15 @@ pub enum FaultKind {
     Halt(u16),
 }
 
+/// What ticks by a clock of its card.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Timer {
+    /// That releases this task.
+    Task(u16),
+    /// That makes the events of this interrupter.
+    Interrupter(u16),
+}
+
 /// All faults of a run, in any order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FaultPlan {
@@ -61,6 +84,31 @@ impl FaultPlan {
     /// The end of the latest fault of this kind that holds at `now`, if any does.
     pub fn holds(&self, now: Ns, kind: FaultKind) -> Option<Ns> {
         self.faults.iter().filter(|f| f.kind == kind && f.from_ns <= now && now < f.until_ns).map(|f| f.until_ns).max()
+    }
+
+    /// When the clock behind a timer shows `shown`.
+    pub fn instant(&self, timer: Timer, shown: Ns) -> Ns {
+        let drifts = self.faults.iter().filter_map(|fault| match fault.kind {
+            FaultKind::Drift { timer: drifting, gain_ppb } if drifting == timer => Some((fault, gain_ppb)),
+            _ => None,
+        });
+        let gained = |t: Ns| {
+            let of = |(fault, ppb): (&Fault, i64)| {
+                let held = t.min(fault.until_ns).saturating_sub(fault.from_ns);
+                i128::from(held) * i128::from(ppb) / 1_000_000_000
+            };
+            drifts.clone().map(of).sum::<i128>() as i64
+        };
+        // the gain is a small part of the time: this settles within a few rounds
+        let mut t = shown;
+        for _ in 0..INVERSIONS {
+            let next = shown.saturating_add_signed(-gained(t));
+            if next == t {
+                break;
+            }
+            t = next;
+        }
+        t
     }
 
     /// Execution time of the task's operation at `now`.
@@ -82,6 +130,24 @@ mod tests {
         let held = |now| plan.holds(now, FaultKind::StuckBus);
         assert_eq!((held(9), held(10), held(19), held(20)), (None, Some(20), Some(20), None));
         assert_eq!(plan.holds(15, FaultKind::NoSlave(0)), None);
+    }
+
+    #[test]
+    fn a_drifting_clock_shows_an_instant_early_or_late_and_keeps_what_it_has_gained() {
+        let timer = Timer::Interrupter(3);
+        let drift = |gain_ppb| Fault { from_ns: 1_000, until_ns: 11_000, kind: FaultKind::Drift { timer, gain_ppb } };
+        for gain_ppb in [100_000_000, -100_000_000, 20_000_000] {
+            let plan = FaultPlan { faults: vec![drift(gain_ppb)] };
+            let gain = gain_ppb as f64 * 1e-9;
+            for shown in [0, 999, 1_000, 5_000, 9_000, 20_000, 1_000_000] {
+                let t = plan.instant(timer, shown) as f64;
+                let shows = t + (t.min(11_000.0) - 1_000.0).max(0.0) * gain;
+                assert!((shows - shown as f64).abs() <= 1.2, "{gain}: {shown} at {t}");
+                assert_eq!(plan.instant(Timer::Task(3), shown), shown);
+            }
+            let late = 1 << 60;
+            assert_eq!(plan.instant(timer, late) as i64 - late as i64, -gain_ppb / 100_000, "kept");
+        }
     }
 
     #[test]

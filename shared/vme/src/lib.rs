@@ -30,7 +30,7 @@ pub mod timing;
 pub mod traffic;
 
 pub use check::RackError;
-pub use fault::{Fault, FaultKind, FaultPlan};
+pub use fault::{Fault, FaultKind, FaultPlan, Timer};
 pub use program::{Access, Direction, Op, Origin, Program, Status, Transfer, Width};
 pub use timing::{JobRecord, Log, Sink, Stop, Timing};
 

@@ -107,6 +107,8 @@ pub enum Status {
 pub enum Origin {
     /// An access of a task's program.
     Program,
+    /// An access of a task's program once more ([`crate::FaultKind::RepeatedRead`]); it moves the same data.
+    Repeat,
     /// A task looks whether its event has come ([`crate::rack::Release::Poll`]).
     Poll,
     /// Interrupt acknowledge cycle of a handler.

@@ -18,7 +18,7 @@ mod wiring;
 use crate::Ns;
 use crate::arbiter::Arbiter;
 use crate::check::RackError;
-use crate::fault::{FaultKind, FaultPlan};
+use crate::fault::{FaultKind, FaultPlan, Timer};
 use crate::interrupt::Line;
 use crate::program::{Origin, Transfer};
 use crate::rack::{Rack, Release};
@@ -157,12 +157,18 @@ impl Timing {
         let rack = &wiring.rack;
         for (i, fault) in faults.faults.iter().enumerate() {
             let (kind, index, n) = match fault.kind {
-                FaultKind::NoSlave(s) => ("slave", s, rack.slaves.len()),
+                FaultKind::NoSlave(s) | FaultKind::RepeatedRead(s) => ("slave", s, rack.slaves.len()),
                 FaultKind::Starvation(m) => ("master", m, wiring.masters.len()),
                 FaultKind::StuckBus => continue,
-                FaultKind::LostInterrupt(i) => ("interrupter", i, rack.interrupters.len()),
+                FaultKind::LostInterrupt(i) | FaultKind::Drift { timer: Timer::Interrupter(i), .. } => {
+                    ("interrupter", i, rack.interrupters.len())
+                }
                 FaultKind::CableOut(a) | FaultKind::Parity(a) => ("adaptor", a, rack.adaptors.len()),
-                FaultKind::Slow { task, .. } | FaultKind::Overrun { task, .. } | FaultKind::Halt(task) => ("task", task, rack.tasks.len()),
+                FaultKind::Slow { task, .. }
+                | FaultKind::Overrun { task, .. }
+                | FaultKind::RepeatedWrite(task)
+                | FaultKind::Drift { timer: Timer::Task(task), .. }
+                | FaultKind::Halt(task) => ("task", task, rack.tasks.len()),
             };
             if usize::from(index) >= n {
                 return Err(RackError::Unknown { party: format!("fault {i}"), kind, name: format!("number {index}") });
@@ -177,13 +183,16 @@ impl Timing {
         agenda.set(Wiring::FAULT, fault_times.first().map_or(Ns::MAX, |f| f.0));
         for (t, task) in rack.tasks.iter().enumerate() {
             match task.release {
-                Release::Timer => agenda.set(wiring.task(t as u16), task.offset_ns),
+                Release::Timer => {
+                    agenda.set(wiring.task(t as u16), faults.instant(Timer::Task(t as u16), task.offset_ns));
+                }
                 Release::Poll(_) => agenda.set(wiring.dispatch(wiring.processor_of_task[t]), 0),
                 Release::Interrupt(_) => {}
             }
         }
         for (i, interrupter) in rack.interrupters.iter().enumerate() {
-            agenda.set(wiring.interrupter(i as u16), interrupter.ticks.map_or(Ns::MAX, |ticks| ticks.at(0)));
+            let first = interrupter.ticks.map_or(Ns::MAX, |ticks| ticks.at(0));
+            agenda.set(wiring.interrupter(i as u16), faults.instant(Timer::Interrupter(i as u16), first));
         }
         let generators: Vec<Generator> = (rack.traffic.iter().enumerate())
             .map(|(g, t)| Generator {
@@ -279,7 +288,8 @@ impl Timing {
                 let line = &mut self.lines[i as usize];
                 line.tick += 1;
                 let ticks = self.wiring.rack.interrupters[i as usize].ticks;
-                self.agenda.set(due, ticks.map_or(Ns::MAX, |ticks| ticks.at(line.tick)));
+                let next = ticks.map_or(Ns::MAX, |ticks| ticks.at(line.tick));
+                self.agenda.set(due, self.faults.instant(Timer::Interrupter(i), next));
                 self.raise(i);
             }
             Source::Task(t) => return self.tick(t),

@@ -97,7 +97,8 @@ fault_kinds! {
     Jitter = "jitter";
     /// Board: its messages get lost, each with probability `amount` (0: every one).
     Drop = "drop";
-    /// Board: its messages come twice.
+    /// Board: its messages come twice. Each access that carries one takes place twice, as if the master had missed the end
+    /// of the first: it costs bus time, the second copy is discarded.
     Duplicate = "duplicate";
     /// Board: every second message comes after the one that follows it.
     Reorder = "reorder";
@@ -121,7 +122,8 @@ fault_kinds! {
     Overrun = "overrun";
     /// Task: its execution times are multiplied by `amount`.
     Slow = "slow";
-    /// Interface card or control computer: its clock gains `amount` parts per million.
+    /// Interface card or control computer: its clock gains `amount` parts per million. Its stamps and the ticks of its
+    /// timers and interrupters go by it; its sampling keeps pace.
     ClockDrift = "clock-drift";
     /// Workstation: its program ends; no more polls, no more commands.
     Gone = "gone";

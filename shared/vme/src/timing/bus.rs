@@ -253,13 +253,35 @@ impl Timing {
                     self.bus.owner = None;
                 }
                 let ended = requester.queue.remove(0);
-                if !requester.queue.is_empty() {
+                let again = self.repeated(&ended);
+                let queue = &mut self.masters[owner as usize].queue;
+                if let Some(again) = again {
+                    queue.insert(0, again);
+                }
+                if !queue.is_empty() {
                     self.ask(owner);
                 }
                 self.wake_arbiter();
-                self.ended(ended.client, &ended.transfer);
+                if again.is_none() {
+                    self.ended(ended.client, &ended.transfer);
+                }
             }
         }
+    }
+
+    /// The same access once more, where a fault repeats it; its client waits for both.
+    fn repeated(&self, ended: &Pending) -> Option<Pending> {
+        let transfer = &ended.transfer;
+        if self.faults.faults.is_empty() || transfer.origin != Origin::Program || transfer.status != Status::Ok {
+            return None;
+        }
+        let kind = match transfer.access.dir {
+            Direction::Read => FaultKind::RepeatedRead(transfer.slave?),
+            Direction::Write => FaultKind::RepeatedWrite(transfer.task),
+        };
+        self.faults.holds(self.now, kind)?;
+        let again = Transfer { requested: self.now, held_ns: 0, origin: Origin::Repeat, ..*transfer };
+        Some(pending(again, ended.client, ended.pace_ns))
     }
 
     /// What the instant of the data causes beside the data.

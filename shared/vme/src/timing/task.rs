@@ -2,7 +2,7 @@
 
 use super::{Sink, Stop, Timing};
 use crate::Ns;
-use crate::fault::FaultKind;
+use crate::fault::{FaultKind, Timer};
 use crate::program::{Op, Program};
 use crate::rack::{Overrun, Release};
 
@@ -176,7 +176,8 @@ impl Timing {
         let task = &mut self.tasks[t as usize];
         let job = task.tick as u32;
         task.tick += 1;
-        self.agenda.set(due, self.wiring.ticks[t as usize].at(task.tick));
+        let next = self.wiring.ticks[t as usize].at(task.tick);
+        self.agenda.set(due, self.faults.instant(Timer::Task(t), next));
         self.release_task(t, job)
     }
 

@@ -117,6 +117,35 @@ fn events_at_the_limit_are_left_for_later_and_a_copy_goes_the_same_way() {
 }
 
 #[test]
+fn an_access_that_takes_place_twice_costs_the_bus_twice_and_the_program_goes_on_behind_both() {
+    let twice = |kind| {
+        let fault = Fault { from_ns: 0, until_ns: 100_000, kind };
+        let mut timing =
+            Timing::with_faults(rack(vec![task("control", "cpu", 0, 100_000)]), FaultPlan { faults: vec![fault] })
+                .unwrap();
+        timing.set_program(0, &[Op::Exec(50), read(), write()]);
+        let mut log = Log::default();
+        assert_eq!(timing.advance(200_000, &mut log), Stop::Fault { fault: 0 });
+        assert_eq!(timing.advance(200_000, &mut log), Stop::Limit);
+        let of = |job| log.transfers.iter().filter(move |t| t.job == job).map(|t| (t.origin, t.index, times(t)));
+        assert_eq!(of(1).count(), 2, "the fault is over");
+        assert_eq!(log.jobs[0].end, log.transfers[2].done);
+        of(0).collect::<Vec<_>>()
+    };
+    use Origin::{Program, Repeat};
+    // 35 + 200 to the data, 100 handshake, and the read stall once: the processor sees one access
+    let reads =
+        [(Program, 0, (50, 350, 585, 685)), (Repeat, 0, (685, 685, 920, 1020)), (Program, 1, (1320, 1320, 1755, 1855))];
+    assert_eq!(twice(FaultKind::RepeatedRead(0)), reads);
+    let writes = [
+        (Program, 0, (50, 350, 585, 685)),
+        (Program, 1, (985, 985, 1420, 1520)),
+        (Repeat, 1, (1520, 1520, 1955, 2055)),
+    ];
+    assert_eq!(twice(FaultKind::RepeatedWrite(0)), writes);
+}
+
+#[test]
 fn a_programs_change_takes_effect_at_the_next_release() {
     let mut timing = Timing::new(rack(vec![task("control", "cpu", 0, 10_000)])).unwrap();
     timing.set_program(0, &[Op::Exec(100), read()]);

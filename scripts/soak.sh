@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Long versions of the tests: every process of the whole rack killed and stopped at many moments; hostile files and messages,
 # FUZZ_SECONDS (default 120) of each kind; the bus's closed forms at ten million transfers, and 10 000 random racks against their
-# bounds; ten minutes in real time at 1 kHz in which no message may be lost or counted twice; the whole fault campaign with an
-# hour in contact without a fault: ./scripts/soak.sh [ROUNDS]
+# bounds; ten minutes in real time at 1 kHz in which no message may be lost or counted twice; the whole fault campaign with ten
+# seeds, and an hour in contact without a fault: ./scripts/soak.sh [ROUNDS]
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/setup.sh
@@ -15,4 +15,6 @@ cargo test --release -p vme -- --ignored --nocapture
 
 cargo build --release --workspace --bins
 "${CARGO_TARGET_DIR:-target}/release/vmerack" latency --seconds 600 --rate 1000 --out runs/soak-latency
-"${CARGO_TARGET_DIR:-target}/release/vmerack" faults --null-hours 1 --out runs/soak-faults
+for seed in {1..10}; do
+    "${CARGO_TARGET_DIR:-target}/release/vmerack" faults --seed "$seed" --null-hours "$((seed == 1))" --out "runs/soak-faults-$seed"
+done

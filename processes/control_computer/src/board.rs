@@ -288,6 +288,7 @@ impl ControlComputer {
         }
         if let Some(ppm) = self.clocks.compare(now, self.sensors.stamps()) {
             findings.report(Detector::ClockSlope, State::Run, ppm);
+            self.sensors.set_clocks(self.clocks.behind());
         }
         let (period, polled) = self.console;
         if let Some(polled) = polled

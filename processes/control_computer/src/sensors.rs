@@ -7,6 +7,7 @@
 
 mod judgement;
 
+use crate::clocks::CARDS as CARDS_THAT_STAMP;
 use crate::force_noise::ForceNoise;
 use crate::program::{CARDS, COUNTER, COUNTS, ERRORS, FORCES, READS, STATUS, is_wide};
 use arm::{JointVector, Spatial};
@@ -23,6 +24,9 @@ const FORCE_INVALID: u32 = (force::ERROR_SATURATED
     | force::ERROR_BUSY
     | force::ERROR_CRC
     | force::ERROR_WATCHDOG) as u32;
+
+/// Samples by which the receiver's counter may be ahead of its stamps: their clock may be slow.
+const FORCE_AHEAD: u16 = 4096;
 
 /// Bits of the six force words among those that came.
 const FORCE_WORDS: u32 = 0x3F << FORCES;
@@ -68,6 +72,8 @@ pub struct Sensors {
     wide_force: bool,
     force_period_ns: u64,
     force_published: Ns,
+    /// What the clocks behind the stamps are known to be behind, ns: encoders, force sensor, D/A and parallel I/O.
+    clocks_behind: [i64; CARDS_THAT_STAMP],
     max_force_age: Ns,
     old_force_jobs: u32,
     same_force_jobs: u32,
@@ -113,6 +119,7 @@ impl Sensors {
             wide_force: is_wide(scenario),
             force_period_ns,
             force_published: 0,
+            clocks_behind: [0; CARDS_THAT_STAMP],
             max_force_age: force_period_ns + force_delay_ns + nanoseconds(scenario.safety.max_force_age_ms * 1e-3),
             old_force_jobs: 0,
             same_force_jobs: 0,
@@ -148,8 +155,13 @@ impl Sensors {
     }
 
     /// When the cards stamped what the last job read afresh: encoders, force sensor, D/A and parallel I/O.
-    pub fn stamps(&self) -> [Option<Ns>; 3] {
+    pub fn stamps(&self) -> [Option<Ns>; CARDS_THAT_STAMP] {
         [COUNTS, FORCES, STATUS].map(|index| (self.held[index] == 0).then_some(self.words[index].t).filter(|t| *t > 0))
+    }
+
+    /// The cards' clocks are so much behind from now on, in the order of [`Sensors::stamps`], ns.
+    pub fn set_clocks(&mut self, behind: [i64; CARDS_THAT_STAMP]) {
+        self.clocks_behind = behind;
     }
 
     /// Decodes the words of `job`, which begins `period_s` after the one before.
@@ -237,7 +249,7 @@ impl Sensors {
                 return;
             }
             self.counts[joint] += turned;
-            self.counts_at[joint] = word.t;
+            self.counts_at[joint] = word.t.saturating_add_signed(self.clocks_behind[0]);
             self.sensed.q[joint] = self.counts[joint] as f64 / self.counts_per_rad[joint];
         }
     }
@@ -251,7 +263,9 @@ impl Sensors {
             return false;
         }
         // where a joint stands when the power comes on is not known so well
-        self.counts_at[joint] > 0 && limit > 0.0 && (turned as f64 / self.counts_per_rad[joint] - expected).abs() > limit
+        self.counts_at[joint] > 0
+            && limit > 0.0
+            && (turned as f64 / self.counts_per_rad[joint] - expected).abs() > limit
     }
 
     fn read_force(&mut self) {
@@ -268,10 +282,14 @@ impl Sensors {
         self.take_force(wrench);
         if self.has(COUNTER) {
             let word = &self.words[COUNTER];
-            let newest = word.t / self.force_period_ns;
+            let read_at = word.t.saturating_add_signed(self.clocks_behind[1]);
+            let newest = read_at / self.force_period_ns;
             let lag = (newest as u16).wrapping_sub(word.value as u16);
-            self.force_published = newest.saturating_sub(lag.into()) * self.force_period_ns;
-            let old = self.force_age(word.t) > self.max_force_age;
+            let ahead = lag.wrapping_neg();
+            let number =
+                if ahead < FORCE_AHEAD { newest + u64::from(ahead) } else { newest.saturating_sub(lag.into()) };
+            self.force_published = number.saturating_mul(self.force_period_ns);
+            let old = self.force_age(read_at) > self.max_force_age;
             count(&mut self.old_force_jobs, old);
         }
         if self.came & FORCE_WORDS == FORCE_WORDS {
@@ -397,12 +415,8 @@ mod tests {
                 let value = if is_count { (counts[index / 2] + 10) as u32 } else { 0 };
                 sensors.take(&word(job, index, value, 0));
             }
-            let why = [Detector::BusError, Detector::AccessTimer, Detector::Sequence][job as usize - 1];
-            if why != Detector::Sequence {
-                sensors.failed(COUNTS as u16 + 4, why);
-            }
             sensors.read(job, 5e-3);
-            assert_eq!(demanded(&sensors), (State::Degraded, Some(why)));
+            assert_eq!(demanded(&sensors), (State::Degraded, Some(Detector::Sequence)));
             assert_eq!(sensors.sensed().q[2], before.q[2]);
         }
         give(&mut sensors, 5, counts, 0);
@@ -410,6 +424,23 @@ mod tests {
         assert_eq!(demanded(&sensors).0, State::Stop, "nothing came in job 4");
         sensors.read(5, 5e-3);
         assert_eq!(demanded(&sensors).0, State::Run, "they were early");
+    }
+
+    #[test]
+    fn without_an_answer_or_a_grant_the_arm_is_stopped_at_once() {
+        for why in [Detector::BusError, Detector::AccessTimer] {
+            let mut sensors = all(&scenario(&[]));
+            let counts = sensors.counts;
+            for (job, sound, demand) in [(0, true, State::Run), (1, false, State::Stop), (2, true, State::Run)] {
+                give(&mut sensors, job, counts, 0);
+                if !sound {
+                    sensors.came &= !(1 << STATUS);
+                    sensors.failed(STATUS as u16, why);
+                }
+                sensors.read(job, 5e-3);
+                assert_eq!(demanded(&sensors), (demand, (!sound).then_some(why)), "{job}");
+            }
+        }
     }
 
     #[test]
@@ -466,6 +497,30 @@ mod tests {
             sensors.read(job as u32, 5e-3);
             assert_eq!(sensors.force_age(t + 1000), t + 1000 - published);
             assert_eq!(sensors.encoder_age(t + 1000), 1000);
+        }
+    }
+
+    #[test]
+    fn a_receiver_whose_clock_is_slow_or_fast_shows_no_old_samples() {
+        let mut sensors = all(&scenario(&[]));
+        let counts = sensors.counts;
+        for (job, stamp, behind) in
+            [(0, 99_999_000, 0), (1, 97_000_000, 0), (2, 97_000_000, 3_000_000), (3, 103_000_000, 0)]
+        {
+            sensors.set_clocks([0, behind, 0]);
+            give(&mut sensors, job, counts, stamp);
+            sensors.take(&word(job, COUNTER, 100_000_000 / 125_000, stamp));
+            sensors.read(job, 5e-3);
+            assert_eq!(demanded(&sensors).0, State::Run, "{job}");
+            assert_eq!(sensors.force_age(100_001_000), 1_000, "{job}");
+        }
+        // 20 ms fast and not set, then set
+        for (job, behind, state) in [(4, 0, State::Hold), (5, -20_000_000, State::Run)] {
+            sensors.set_clocks([0, behind, 0]);
+            give(&mut sensors, job, counts, 120_000_000);
+            sensors.take(&word(job, COUNTER, 100_000_000 / 125_000, 120_000_000));
+            sensors.read(job, 5e-3);
+            assert_eq!(demanded(&sensors).0, state, "{job}");
         }
     }
 

@@ -177,14 +177,14 @@ fn an_emergency_stop_takes_the_torque_off_in_the_job_that_sees_it() {
 }
 
 #[test]
-fn a_card_that_does_not_answer_is_bridged_then_stops_the_arm() {
+fn a_card_that_does_not_answer_stops_the_arm_until_it_answers_and_somebody_acknowledges() {
     let mut rig = Rig::new(table_5_3());
     for _ in 0..3 {
         rig.run();
     }
     rig.failing = vec![rig.reads[4].addr];
     let mut states = Vec::new();
-    for job in 0..6 {
+    for job in 0..5 {
         rig.run();
         states.push(state(&rig));
         let errors = rig.events(EventKind::BusError);
@@ -194,7 +194,16 @@ fn a_card_that_does_not_answer_is_bridged_then_stops_the_arm() {
         }
     }
     // an arm at rest has nothing to decelerate: SS1 ends at once
-    assert_eq!(states, [1, 1, 1, 3, 4, 4]);
+    assert_eq!(states, [3, 4, 4, 4, 4]);
+    rig.command(command(1, CommandKind::Acknowledge), 0);
+    rig.run();
+    assert_eq!(state(&rig), 4, "it still does not answer");
+    rig.failing.clear();
+    rig.run();
+    assert_eq!(state(&rig), 4, "nobody has acknowledged since");
+    rig.command(command(2, CommandKind::Acknowledge), 0);
+    rig.run();
+    assert_eq!(state(&rig), 0);
 }
 
 #[test]

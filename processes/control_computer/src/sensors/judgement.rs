@@ -45,7 +45,9 @@ impl Sensors {
             if held > 0 {
                 let detector = self.why_held[index];
                 let stop = if detector == Detector::ForceSlew { State::Hold } else { State::Stop };
-                let demand = if held > limits.max_held_jobs { stop } else { State::Degraded };
+                // a card that did not answer was asked twice; without a grant nothing gets through
+                let bus = matches!(detector, Detector::BusError | Detector::AccessTimer);
+                let demand = if bus || held > limits.max_held_jobs { stop } else { State::Degraded };
                 findings.report(detector, demand, index as f64);
             }
         }

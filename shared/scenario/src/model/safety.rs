@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Safety {
-    /// Jobs in a row in which a value may be missing or refused (BERR*, an error of the receiver, a saturated force sensor,
-    /// a count that jumps) before SS1.
+    /// Jobs in a row in which a value may be missing or refused (a lost message, an error of the receiver, a saturated force
+    /// sensor, a count that jumps) before SS1. Where a card does not answer or the bus is not granted, SS1 comes at once.
     pub max_held_jobs: u32,
     /// Age of a force sample, beyond the time between two of its filter's outputs, from which the arm is held (SS2; ms).
     pub max_force_age_ms: f64,
@@ -22,7 +22,8 @@ pub struct Safety {
     /// Standard deviation of a force's noise, over some 20 jobs, from which the arm is held (SS2; N, moments: a tenth in
     /// Nm); 0 = any.
     pub max_force_noise_n: f64,
-    /// Largest force before the first segment with a force axis, when the tool touches nothing, before SS1 (N); 0 = any.
+    /// Largest force before the first segment with a force axis, when the tool touches nothing, before SS1 (N); 0 = any, as
+    /// a task that presses with its position axes needs it.
     pub max_free_force_n: f64,
     /// Difference between the way of a joint from one job to the next and its speed times the period, from which its count
     /// is refused (rad); 0 = any.
@@ -31,7 +32,8 @@ pub struct Safety {
     /// torque goes off, as a share of each joint's torque limit; friction is part of it. 0 = any.
     pub max_residual_share: f64,
     /// Force at the tool that would explain these torques best, from which the sensor is taken to show it too much (bias,
-    /// drift) and the arm is stopped (SS1; N). Friction is part of it: in this arm's contact tasks up to some 50 N. 0 = any.
+    /// drift) and the arm is stopped (SS1; N). Friction is part of it: in this arm's contact tasks up to some 50 N, 30 where
+    /// it slides slowly. 0 = any.
     pub max_force_residual_n: f64,
     /// Speed of a joint whose brake is engaged, from which the torque goes off (rad/s).
     pub max_braked_speed_rad_per_s: f64,
@@ -69,7 +71,7 @@ impl Default for Safety {
             max_free_force_n: 0.0,
             max_count_jump_rad: 2e-3,
             max_residual_share: 0.3,
-            max_force_residual_n: 0.0,
+            max_force_residual_n: 80.0,
             max_braked_speed_rad_per_s: 0.02,
             max_brake_time_ms: 60.0,
             max_missed_polls: 3,

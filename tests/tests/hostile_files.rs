@@ -9,6 +9,7 @@ use bus_analyzer::digest_file;
 use chassis::commands::faults::plan::Plan;
 use chassis::rack_run::{self, Setting};
 use rack_tests::{Bench, Draw, fuzz, program, spoil_file, workspace};
+use report::{Comparison, StoredRun};
 use std::path::Path;
 use std::process::Command;
 use toml::{Table, Value};
@@ -187,6 +188,34 @@ fn no_record_breaks_its_readers_and_what_is_recovered_has_a_digest() {
             let _ = digest_file(&path);
             if bus_analyzer::recover(&path, &whole).is_ok() {
                 digest_file(&whole).expect("a recovered record is whole");
+            }
+        });
+        assert!(memory.bytes_max < MEMORY, "{} bytes", memory.bytes_max);
+    });
+}
+
+#[test]
+fn no_report_breaks_the_comparison() {
+    let bench = Bench::new();
+    let short = ["--variant", "modified", "--in-process", "--no-record", "--duration", "0.3", "--out", "run"];
+    let outcome = bench.run(&[&["run", "table-5-3"], &short[..]].concat());
+    assert!(matches!(outcome.status.code(), Some(0 | 4)), "{}", outcome.stderr);
+    let [report, charts] = ["report.json", "charts.json"].map(|name| bench.path("run").join(name));
+    let corpus = [&report, &charts].map(|path| std::fs::read(path).unwrap());
+    let other = StoredRun::load(&bench.path("run")).unwrap();
+    let words = words("report");
+    fuzz(100, |draw| {
+        for (path, sound) in [&report, &charts].into_iter().zip(&corpus) {
+            let sound = std::slice::from_ref(sound);
+            let content = if draw.below(2) == 0 { sound[0].clone() } else { draw_file(draw, sound, &words) };
+            std::fs::write(path, content).unwrap();
+        }
+        let memory = allocation_counter::measure(|| {
+            if let Ok(run) = StoredRun::load(&bench.path("run")) {
+                for runs in [vec![run.clone(), other.clone()], vec![other.clone(), run]] {
+                    let comparison = Comparison::new(runs);
+                    let _ = (comparison.text(), comparison.html());
+                }
             }
         });
         assert!(memory.bytes_max < MEMORY, "{} bytes", memory.bytes_max);

@@ -50,7 +50,12 @@ impl StoredRun {
         if report["schema_version"] != SCHEMA_VERSION {
             return Err(CompareError::Schema { path, found: report["schema_version"].clone(), expected: SCHEMA_VERSION });
         }
-        let charts = read(&folder.join("charts.json"))?;
+        let path = folder.join("charts.json");
+        let charts: Vec<Chart> = read(&path)?;
+        if let Some(chart) = charts.iter().find(|chart| chart.lines.iter().any(|line| line.y.len() != chart.t.len())) {
+            let reason = format!("a curve of `{}` has not as many values as there are instants", chart.title);
+            return Err(CompareError::Read { path, reason });
+        }
         let name = std::path::absolute(folder).ok().and_then(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
         Ok(StoredRun { label: name.unwrap_or_else(|| folder.display().to_string()), report, charts })
     }

@@ -4,9 +4,9 @@
 //! q̈ = 0 (gravity and velocity products included), then only the additional acceleration is propagated. All about the
 //! tip, so an articulated inertia passes from link to link unchanged.
 
-use crate::bodies::Bodies;
-use crate::kinematics::{Frames, Motion, Screws};
-use crate::lanes::lane;
+use crate::bodies::{bodies, wrenches};
+use crate::kinematics::{Motion, Screw, Screws, frames, screws};
+use crate::lanes::{Lanes, PAIRS, lane};
 use crate::model::ArmModel;
 use crate::small::{M3, Sym3, V3, v3};
 use crate::{DOF, JointVector, Spatial};
@@ -45,7 +45,7 @@ pub fn aba(
     match &model.slide {
         Some(slide) => slide.aba(model.gravity, tau, armature, f_tip),
         None => {
-            let screws = Screws::new(&Frames::new(model, q));
+            let screws = screws(&frames(model, q));
             let motion = Motion::new(&screws, qd);
             aba_in(model, &screws, &motion, tau, armature, f_tip)
         }
@@ -61,17 +61,21 @@ pub(crate) fn aba_in(
     armature: &JointVector,
     f_tip: &Spatial,
 ) -> JointVector {
-    let bodies = Bodies::new(model, screws);
-    let needed = bodies.wrenches(model.gravity, motion);
+    let bodies = bodies(model, screws);
+    let needed = wrenches(&bodies, model.gravity, motion);
+    let axis = |i: usize| {
+        let Screw { s, r, .. } = screws[i % PAIRS];
+        if i < PAIRS { (s.low(), r.z.low()) } else { (s.high(), r.z.high()) }
+    };
     let mut rows = [Row::default(); DOF];
     let mut art = Articulated::default();
     let mut f = -v3(f_tip[0], f_tip[1], f_tip[2]);
     let mut n = -v3(f_tip[3], f_tip[4], f_tip[5]);
     for i in (0..DOF).rev() {
-        let (s, z) = (lane(&screws.s, i), lane(&screws.r, i).z);
-        art.add_body(lane(&bodies.first, i), lane(&bodies.second, i).complement());
-        f += lane(&needed.f, i);
-        n += lane(&needed.n, i);
+        let ((s, z), body, wrench) = (axis(i), lane(&bodies, i), lane(&needed, i));
+        art.add_body(body.first, body.second.complement());
+        f += wrench.f;
+        n += wrench.n;
 
         let uf = art.a * s + art.b * z;
         let un = v3(art.b.x.dot(s), art.b.y.dot(s), art.b.z.dot(s)) + art.d * z;
@@ -92,8 +96,9 @@ pub(crate) fn aba_in(
     let (mut a, mut dw) = (V3::ZERO, V3::ZERO);
     for (i, row) in rows.iter().enumerate() {
         qdd[i] = (row.u - row.uf.dot(a) - row.un.dot(dw)) * row.inv;
-        a += lane(&screws.s, i) * qdd[i];
-        dw += lane(&screws.r, i).z * qdd[i];
+        let (s, z) = axis(i);
+        a += s * qdd[i];
+        dw += z * qdd[i];
     }
     qdd
 }

@@ -8,57 +8,55 @@ use crate::lanes::{Lanes, PAIRS, Pair};
 use crate::model::ArmModel;
 use crate::small::{M3, Sym3, V3};
 
-/// First moments (kg m) and second moments (kg m²) of the links about the tip, base axes. Base parameters (`chain`): no
-/// link has a mass, its part of the first moments does not depend on the point of reference.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Bodies {
-    pub first: [V3<Pair>; PAIRS],
-    pub second: [Sym3<Pair>; PAIRS],
+/// First moment (kg m) and second moments (kg m²) of a link, or of several together, about the tip, base axes. Base
+/// parameters (`chain`): no link has a mass, its part of the first moments does not depend on the point of reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Body<T = f64> {
+    pub first: V3<T>,
+    pub second: Sym3<T>,
 }
 
-/// Forces (N) and moments about the tip (Nm) on the base parameters: only their components along the joints are physical.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Wrenches {
-    pub f: [V3<Pair>; PAIRS],
-    pub n: [V3<Pair>; PAIRS],
+/// The links' moments.
+pub(crate) type Bodies = [Body<Pair>; PAIRS];
+
+/// Force (N) and moment about the tip (Nm) on the base parameters: only the components along the joints are physical.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Wrench<T = f64> {
+    pub f: V3<T>,
+    pub n: V3<T>,
 }
 
-impl Bodies {
-    #[inline(always)]
-    pub fn new(model: &ArmModel, screws: &Screws) -> Bodies {
-        let chain = &model.chain;
-        let half = Pair::splat(0.5);
-        let first = std::array::from_fn(|k| screws.r[k].x * chain.first[k].x + screws.r[k].y * chain.first[k].y);
-        let second = std::array::from_fn(|k| {
-            let (h, i, d, M3 { x, y, z }) = (chain.first[k], chain.second[k], screws.d[k], screws.r[k]);
+#[inline(always)]
+pub(crate) fn bodies(model: &ArmModel, screws: &Screws) -> Bodies {
+    let links = &model.chain.links;
+    std::array::from_fn(|k| {
+        let (h, i) = (links[k].first, links[k].second);
+        let (d, M3 { x, y, z }) = (screws[k].d, screws[k].r);
+        Body {
+            first: x * h.x + y * h.y,
             // R i Rᵀ + d (R h)ᵀ + (R h) dᵀ, ordered by the axes; i.zz and h.z are nothing
-            Sym3::outer_sum(x, x * (i.xx * half) + y * i.xy + z * i.xz + d * h.x)
-                + Sym3::outer_sum(y, y * (i.yy * half) + z * i.yz + d * h.y)
-        });
-        Bodies { first, second }
-    }
+            second: Sym3::outer_sums((x, x * i.xx + y * i.xy + z * i.xz + d * h.x), (y, y * i.yy + z * i.yz + d * h.y)),
+        }
+    })
+}
 
-    /// What each link on its own needs to move like this, gravity included.
-    #[inline(always)]
-    pub fn wrenches(&self, gravity: V3, motion: &Motion) -> Wrenches {
-        let up = V3::pair(-gravity, -gravity);
-        let spin: [M3<Pair>; PAIRS] = std::array::from_fn(|k| spin_matrix(motion.w[k], motion.dw[k]));
-        let f = std::array::from_fn(|k| spin[k] * self.first[k]);
-        let n = std::array::from_fn(|k| {
-            let a = motion.a[k] + motion.w[k].cross(motion.v[k]) + up;
-            let (h, i) = (self.first[k], self.second[k]);
-            // moment of spin·x dm over x: the antisymmetric part of spin·second moments
-            let of = |row: V3<Pair>, x: Pair, y: Pair, z: Pair| row.x * x + row.y * y + row.z * z;
-            let (rx, ry, rz) = rows(spin[k]);
-            let n = V3 {
-                x: of(rz, i.xy, i.yy, i.yz) - of(ry, i.xz, i.yz, i.zz),
-                y: of(rx, i.xz, i.yz, i.zz) - of(rz, i.xx, i.xy, i.xz),
-                z: of(ry, i.xx, i.xy, i.xz) - of(rx, i.xy, i.yy, i.yz),
-            };
-            n + h.cross(a)
-        });
-        Wrenches { f, n }
-    }
+/// What each link on its own needs to move like this, gravity included.
+#[inline(always)]
+pub(crate) fn wrenches(bodies: &Bodies, gravity: V3, motion: &Motion) -> [Wrench<Pair>; PAIRS] {
+    let up = V3::pair(-gravity, -gravity);
+    std::array::from_fn(|k| {
+        let (h, i) = (bodies[k].first, bodies[k].second);
+        let spin = spin_matrix(motion.w[k], motion.dw[k]);
+        // moment of spin·x dm over x: the antisymmetric part of spin·second moments
+        let of = |row: V3<Pair>, x: Pair, y: Pair, z: Pair| row.x * x + row.y * y + row.z * z;
+        let (rx, ry, rz) = rows(spin);
+        let n = V3 {
+            x: of(rz, i.xy, i.yy, i.yz) - of(ry, i.xz, i.yz, i.zz),
+            y: of(rx, i.xz, i.yz, i.zz) - of(rz, i.xx, i.xy, i.xz),
+            z: of(ry, i.xx, i.xy, i.xz) - of(rx, i.xy, i.yy, i.yz),
+        };
+        Wrench { f: spin * h, n: n + h.cross(motion.a[k] + up) }
+    })
 }
 
 #[inline(always)]

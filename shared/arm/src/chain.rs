@@ -2,36 +2,34 @@
 //!
 //! A fixed rotation between two joint axes is Rz(a) Rx(b) Rz(c) whatever it is. Turning each joint frame about its own
 //! axis takes the outer two into the joint angles: what remains between two frames is a turn about x. Link i's inertia
-//! and the origin of the next frame are given in these turned frames, the inertias two at a time.
+//! and the origin of the next frame are given in these turned frames, the inertias two at a time. The tip is an eighth
+//! joint that stays where it is.
 //!
 //! The inertias are the base parameters (Khalil and Dombre): a mass on a joint's axis does not feel the joint, so what of
 //! a link is equal to a rod on its joint's axis is counted with the link before. Neither torques nor energy differ, and
 //! of a link's ten parameters seven remain.
 
+use crate::DOF;
+use crate::bodies::Body;
 use crate::inertia::Inertia;
 use crate::lanes::{PAIRS, Pair, paired};
 use crate::model::ArmModel;
 use crate::small::{M3, Sym3, V3, v3};
-use crate::{DOF, JointVector};
 
 /// Constants of the chain.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Chain {
-    /// What the turned frames add to the joint angles (rad).
-    pub offset: JointVector,
+    /// What the turned frames add to the joint angles (rad); the tip's is its angle.
+    pub offset: [Pair; PAIRS],
     /// Axes in the base of the frame before joint 1 has turned.
     pub base: M3,
     /// Cosine and sine of the turn about x from the frame before, from joint 2 on.
-    pub twist: [(f64, f64); DOF],
+    pub twist: [(f64, f64); DOF + 1],
     /// Origin in the frame before (m).
-    pub p: [V3; DOF],
-    /// Tip in frame 7.
-    pub tip_r: M3,
-    pub tip_p: V3,
-    /// First moments (kg m) and second moments (kg m²) of the links about their frames' origins, less what sits on the
-    /// joint's axis: no mass, and nothing along z alone. Nothing in the tip's lane.
-    pub first: [V3<Pair>; PAIRS],
-    pub second: [Sym3<Pair>; PAIRS],
+    pub p: [V3; DOF + 1],
+    /// Moments of the links about their frames' origins, less what sits on the joint's axis: no mass, and nothing along z
+    /// alone. The diagonal second moments are halved. Nothing in the tip's lane.
+    pub links: [Body<Pair>; PAIRS],
     /// First moment of what never moves: all that sits on axis 1, base axes about the base's origin (kg m).
     pub fixed: V3,
 }
@@ -48,27 +46,31 @@ impl Chain {
     pub fn of(model: &ArmModel) -> Chain {
         let mut chain = Chain::default();
         let mut bodies = [Moments::default(); DOF + 1];
-        let mut parts = model.joints.each_ref().map(|joint| zxz(joint.r));
+        let place = |i: usize| model.joints.get(i).map_or((model.tip_r, model.tip_p), |joint| (joint.r, joint.p));
+        let mut parts: [_; DOF + 1] = std::array::from_fn(|i| zxz(place(i).0));
         // the first frame is the base's and stays
         chain.base = about_z(parts[0].0) * about_x(parts[0].1);
         parts[0].0 = 0.0;
-        for i in 0..DOF {
+        let mut offset = [0.0; DOF + 1];
+        for i in 0..=DOF {
             let (own, twist, after) = parts[i];
             let next = parts.get(i + 1).map_or(0.0, |part| part.0);
-            chain.offset[i] = after + next;
+            offset[i] = after + next;
             chain.twist[i] = (libm::cos(twist), libm::sin(twist));
-            chain.p[i] = about_z(-own) * model.joints[i].p;
-            bodies[i] = Moments::of(&model.joints[i].body.turned(about_z(-next)));
+            chain.p[i] = about_z(-own) * place(i).1;
+            if let Some(joint) = model.joints.get(i) {
+                bodies[i] = Moments::of(&joint.body.turned(about_z(-next)));
+            }
         }
+        chain.offset = paired(&offset);
         for i in (1..DOF).rev() {
             let (cos, sin) = chain.twist[i];
             let rod = bodies[i].take_rod(chain.p[i], v3(0.0, -sin, cos));
             bodies[i - 1].add(&rod);
         }
         chain.fixed = bodies[0].take_rod(chain.p[0], chain.base.z).first;
-        (chain.tip_r, chain.tip_p) = (model.tip_r, model.tip_p);
-        chain.first = paired(&bodies.map(|body| body.first));
-        chain.second = paired(&bodies.map(|body| body.second));
+        chain.links =
+            paired(&bodies.map(|Moments { first, second, .. }| Body { first, second: second.with_halved_diagonal() }));
         chain
     }
 }
@@ -120,7 +122,7 @@ fn about_x(angle: f64) -> M3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ArmState, rotation};
+    use crate::{ArmState, JointVector, rotation};
     use nalgebra::{Matrix3, Vector3};
 
     #[test]

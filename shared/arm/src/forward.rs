@@ -1,12 +1,12 @@
 //! Forward dynamics by the mass matrix: for seven joints cheaper than articulated bodies, because the composite bodies
 //! and the bias come from the same pass and seven equations are few.
 
-use crate::bodies::Bodies;
+use crate::bodies::bodies;
 use crate::crba::mass_rows;
 use crate::kinematics::{Motion, Screws};
-use crate::lanes::{Lanes, PAIRS, Pair, joints_of, lane};
+use crate::lanes::{Lanes, PAIRS, Pair, lane, pairs_of};
 use crate::model::ArmModel;
-use crate::rnea::joint_torques;
+use crate::rnea::{along, carried};
 use crate::{DOF, JointVector, Spatial};
 
 /// q̈ of (M + diag(armature)) q̈ = τ + Jᵀ f_tip − C q̇ − g.
@@ -19,17 +19,16 @@ pub(crate) fn accelerations(
     armature: &JointVector,
     f_tip: &Spatial,
 ) -> JointVector {
-    let bodies = Bodies::new(model, screws);
-    let taken = joint_torques(model, screws, motion, &bodies, f_tip);
-    let mut rows = mass_rows(screws, bodies);
-    let left = tau - joints_of(&taken);
+    let bodies = bodies(model, screws);
+    let carried = carried(model, motion, &bodies, f_tip);
+    let mut rows = mass_rows(screws, &bodies);
+    let (tau, armature) = (pairs_of(tau, 0.0), pairs_of(armature, 0.0));
+    let left: [Pair; PAIRS] = std::array::from_fn(|k| tau[k] - along(&screws[k], &carried[k]));
     for i in 0..DOF {
-        let mut own = rows[i][i % PAIRS].to_array();
-        own[i / PAIRS] += armature[i];
-        rows[i][i % PAIRS] = Pair::new(own);
+        let own = Pair::pair(lane(&armature, i), 0.0);
+        rows[i][i % PAIRS] += if i < PAIRS { own } else { Pair::pair(0.0, own.low()) };
         // the tip's lane holds the right-hand side
-        let last = rows[i][PAIRS - 1].low();
-        rows[i][PAIRS - 1] = Pair::pair(last, left[i]);
+        rows[i][PAIRS - 1] = Pair::pair(rows[i][PAIRS - 1].low(), lane(&left, i));
     }
     solve(rows)
 }
@@ -38,44 +37,47 @@ pub(crate) fn accelerations(
 /// on, with b in the tip's lane.
 #[inline(always)]
 fn solve(mut rows: [[Pair; PAIRS]; DOF]) -> JointVector {
-    let (mut inverse, mut x) = ([0.0; DOF], JointVector::zeros());
     // one by one, so that the compiler knows every index
-    eliminate(&mut rows, &mut inverse, 0);
-    eliminate(&mut rows, &mut inverse, 1);
-    eliminate(&mut rows, &mut inverse, 2);
-    eliminate(&mut rows, &mut inverse, 3);
-    eliminate(&mut rows, &mut inverse, 4);
-    eliminate(&mut rows, &mut inverse, 5);
-    eliminate(&mut rows, &mut inverse, 6);
-    substitute(&rows, &inverse, &mut x, 6);
-    substitute(&rows, &inverse, &mut x, 5);
-    substitute(&rows, &inverse, &mut x, 4);
-    substitute(&rows, &inverse, &mut x, 3);
-    substitute(&rows, &inverse, &mut x, 2);
-    substitute(&rows, &inverse, &mut x, 1);
-    substitute(&rows, &inverse, &mut x, 0);
-    x
+    eliminate(&mut rows, 0);
+    eliminate(&mut rows, 1);
+    eliminate(&mut rows, 2);
+    eliminate(&mut rows, 3);
+    eliminate(&mut rows, 4);
+    eliminate(&mut rows, 5);
+    eliminate(&mut rows, 6);
+    let mut x = [0.0; DOF];
+    substitute(&rows, &mut x, 6);
+    substitute(&rows, &mut x, 5);
+    substitute(&rows, &mut x, 4);
+    substitute(&rows, &mut x, 3);
+    substitute(&rows, &mut x, 2);
+    substitute(&rows, &mut x, 1);
+    substitute(&rows, &mut x, 0);
+    x.into()
 }
 
-/// Takes unknown `k` out of the rows after its own.
+/// Divides row `k` by its pivot and takes unknown `k` out of the rows after it.
 #[inline(always)]
-fn eliminate(rows: &mut [[Pair; PAIRS]; DOF], inverse: &mut [f64; DOF], k: usize) {
-    inverse[k] = 1.0 / lane(&rows[k], k);
+fn eliminate(rows: &mut [[Pair; PAIRS]; DOF], k: usize) {
+    let row = rows[k];
+    let inverse = Pair::splat(1.0 / lane(&row, k));
+    let divided = row.map(|entry| entry * inverse);
     for i in k + 1..DOF {
-        let factor = Pair::splat(lane(&rows[k], i) * inverse[k]);
+        let factor = Pair::splat(lane(&divided, i));
         for c in i.saturating_sub(PAIRS)..PAIRS {
-            rows[i][c] -= rows[k][c] * factor;
+            rows[i][c] -= row[c] * factor;
         }
     }
+    rows[k] = divided;
 }
 
 /// Unknown `k` from those after it.
 #[inline(always)]
-fn substitute(rows: &[[Pair; PAIRS]; DOF], inverse: &[f64; DOF], x: &mut JointVector, k: usize) {
+fn substitute(rows: &[[Pair; PAIRS]; DOF], x: &mut [f64; DOF], k: usize) {
     let mut rest = lane(&rows[k], DOF);
     // the newest unknown last: only that one is waited for
     for i in (k + 1..DOF).rev() {
         rest -= lane(&rows[k], i) * x[i];
     }
-    x[k] = rest * inverse[k];
+    x[k] = rest;
 }

@@ -3,16 +3,61 @@
 //! A pair is two numbers in one machine register, so that what is the same for every joint costs half. The compiler's
 //! target decides how a pair is computed, never the machine it runs on: the bits are those of plain arithmetic.
 
+use crate::bodies::{Body, Wrench};
+use crate::exponential::exp_minus;
+use crate::sincos::sin_cos;
 use crate::small::{M3, Real, Sym3, V3};
 use crate::{DOF, JointVector};
 
 /// Two numbers.
-pub(crate) type Pair = wide::f64x2;
+pub type Pair = wide::f64x2;
 
 /// Pairs that hold seven joints and the tip.
 pub(crate) const PAIRS: usize = 4;
 
-impl Real for Pair {}
+impl Real for Pair {
+    #[inline(always)]
+    fn of(x: f64) -> Pair {
+        Pair::splat(x)
+    }
+    #[inline(always)]
+    fn abs(self) -> Pair {
+        Pair::abs(self)
+    }
+    #[inline(always)]
+    fn within(self, limit: Pair) -> Pair {
+        // where a number is missing these give the second
+        (-limit).fast_max(limit.fast_min(self))
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Pair, Pair) {
+        sin_cos(self)
+    }
+    #[inline(always)]
+    fn exp_minus(self) -> Pair {
+        exp_minus(self)
+    }
+}
+
+/// By way of a pair: the same bits.
+impl Real for f64 {
+    fn of(x: f64) -> f64 {
+        x
+    }
+    fn abs(self) -> f64 {
+        f64::abs(self)
+    }
+    fn within(self, limit: f64) -> f64 {
+        Pair::of(self).within(Pair::of(limit)).low()
+    }
+    fn sin_cos(self) -> (f64, f64) {
+        let (sin, cos) = sin_cos(Pair::of(self));
+        (sin.low(), cos.low())
+    }
+    fn exp_minus(self) -> f64 {
+        exp_minus(Pair::of(self)).low()
+    }
+}
 
 /// One number per joint; `tip` in the lane of the tip.
 #[inline(always)]
@@ -83,6 +128,8 @@ macro_rules! lanes_of_components {
 
 lanes_of_components!(V3 { x: f64, y: f64, z: f64 });
 lanes_of_components!(M3 { x: V3, y: V3, z: V3 });
+lanes_of_components!(Body { first: V3, second: Sym3 });
+lanes_of_components!(Wrench { f: V3, n: V3 });
 lanes_of_components!(Sym3 { xx: f64, xy: f64, xz: f64, yy: f64, yz: f64, zz: f64 });
 
 /// A 3-vector whose first two components share a register: for recursions from joint to joint.
@@ -147,34 +194,37 @@ pub(crate) fn lane<T: Lanes>(pairs: &[T; PAIRS], i: usize) -> T::One {
     if i < PAIRS { pairs[i].low() } else { pairs[i - PAIRS].high() }
 }
 
-/// Turns every joint's quantity into the sum from joint 1 up to and with it; the tip's lane gets all.
+/// Every joint's sum from joint 1 up to and with its own; the tip's is all.
 #[inline(always)]
-pub(crate) fn sum_from_base<T: Lanes>(x: &mut [T; PAIRS])
+pub(crate) fn from_base<T: Lanes>([a, b, c, d]: [T; PAIRS]) -> [T; PAIRS]
 where
     T::One: Default,
 {
-    for k in 1..PAIRS {
-        x[k] = x[k - 1].plus(x[k]);
-    }
-    let carry = T::pair(T::One::default(), x[PAIRS - 1].low());
-    for x in x {
-        *x = x.plus(carry);
-    }
+    let b = a.plus(b);
+    let c = b.plus(c);
+    let d = c.plus(d);
+    let carry = T::pair(T::One::default(), d.low());
+    [a.plus(carry), b.plus(carry), c.plus(carry), d.plus(carry)]
 }
 
-/// Turns every joint's quantity into the sum from the tip down to and with it.
+/// Sum over all lanes.
 #[inline(always)]
-pub(crate) fn sum_from_tip<T: Lanes>(x: &mut [T; PAIRS])
+pub(crate) fn total(x: &[V3<Pair>; PAIRS]) -> V3 {
+    let sum = (x[0] + x[1]) + (x[2] + x[3]);
+    sum.low() + sum.high()
+}
+
+/// Every joint's sum from the tip down to and with its own.
+#[inline(always)]
+pub(crate) fn from_tip<T: Lanes>([a, b, c, d]: [T; PAIRS]) -> [T; PAIRS]
 where
     T::One: Default,
 {
-    for k in (0..PAIRS - 1).rev() {
-        x[k] = x[k + 1].plus(x[k]);
-    }
-    let carry = T::pair(x[0].high(), T::One::default());
-    for x in x {
-        *x = x.plus(carry);
-    }
+    let c = d.plus(c);
+    let b = c.plus(b);
+    let a = b.plus(a);
+    let carry = T::pair(a.high(), T::One::default());
+    [a.plus(carry), b.plus(carry), c.plus(carry), d.plus(carry)]
 }
 
 #[cfg(test)]
@@ -185,14 +235,14 @@ mod tests {
     fn sums_run_over_the_joints_in_order() {
         let ones: [f64; 8] = std::array::from_fn(|i| (1 << i) as f64);
         let pairs: [Pair; PAIRS] = paired(&ones);
-        let (mut from_base, mut from_tip) = (pairs, pairs);
-        sum_from_base(&mut from_base);
-        sum_from_tip(&mut from_tip);
+        let (up, down) = (from_base(pairs), from_tip(pairs));
         for i in 0..8 {
             assert_eq!(lane(&pairs, i), ones[i]);
-            assert_eq!(lane(&from_base, i), ones[..=i].iter().sum::<f64>());
-            assert_eq!(lane(&from_tip, i), ones[i..].iter().sum::<f64>());
+            assert_eq!(lane(&up, i), ones[..=i].iter().sum::<f64>());
+            assert_eq!(lane(&down, i), ones[i..].iter().sum::<f64>());
         }
+        let zero = Pair::default();
+        assert_eq!(total(&pairs.map(|pair| V3 { x: pair, y: zero, z: pair })), V3 { x: 255.0, y: 0.0, z: 255.0 });
         let joints = JointVector::from_fn(|i, _| ones[i]);
         assert_eq!(pairs_of(&joints, 128.0), pairs);
         assert_eq!(joints_of(&pairs), joints);

@@ -14,6 +14,7 @@
 //! | `slide` | the one-axis test arm |
 //! | `drives` | gears, friction, amplifiers, brakes: data |
 //! | `mismatch` | a plant that differs from the controller's model |
+//! | `lanes`, `sincos`, `exponential` | two joints at a time |
 //! | `rotation` | logarithm, exponential, orientation error, roll-pitch-yaw |
 
 mod aba;
@@ -21,6 +22,7 @@ mod bodies;
 mod chain;
 mod crba;
 pub mod drives;
+mod exponential;
 mod forward;
 mod inertia;
 mod kinematics;
@@ -41,8 +43,10 @@ pub use crba::crba;
 pub use inertia::BodyInertia;
 pub use kinematics::{Pose, TipMotion, forward_kinematics, jacobian, jdot_qd, joint_origins, tip_motion};
 pub use mismatch::Mismatch;
+pub use lanes::Pair;
 pub use model::{ArmModel, Tool};
 pub use rnea::{bias, gravity_torque, rnea};
+pub use small::Real;
 pub use state::ArmState;
 pub use urdf::UrdfError;
 

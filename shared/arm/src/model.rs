@@ -8,7 +8,7 @@ use crate::chain::Chain;
 use crate::inertia::{BodyInertia, Inertia};
 use crate::slide::Slide;
 use crate::small::{M3, V3, v3};
-use crate::{DOF, JointVector, STANDARD_GRAVITY, UrdfError};
+use crate::{DOF, JointVector, Pose, STANDARD_GRAVITY, UrdfError};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::LazyLock;
 
@@ -93,7 +93,7 @@ impl ArmModel {
             speed: limit(10.0, 10.0),
             effort: limit(1e4, 1e3),
             held: Vec::new(),
-            slide: Some(Slide { mass: mass_kg }),
+            slide: Some(Slide { mass: mass_kg, r: M3::IDENTITY, p: V3::ZERO }),
             chain: Chain::default(),
         }
     }
@@ -168,6 +168,19 @@ impl ArmModel {
         self
     }
 
+    /// The same arm seen from another frame, which takes the place of the base: `base` in the present base.
+    pub fn seen_from(mut self, base: &Pose) -> ArmModel {
+        let turn = M3::from(base.r).transpose();
+        let place = |p: V3| turn * (p - V3::from(base.p));
+        self.joints[0].r = turn * self.joints[0].r;
+        self.joints[0].p = place(self.joints[0].p);
+        if let Some(slide) = &mut self.slide {
+            (slide.r, slide.p) = (turn * slide.r, place(slide.p));
+        }
+        self.gravity = turn * self.gravity;
+        self.settled()
+    }
+
     /// The same arm with a tool bolted to the tip; the tip frame stays where it is.
     pub fn with_tool(mut self, tool: &Tool) -> ArmModel {
         match &mut self.slide {
@@ -189,3 +202,33 @@ impl ArmModel {
 }
 
 pub(crate) const DEFAULT_GRAVITY: V3 = v3(0.0, 0.0, -STANDARD_GRAVITY);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Spatial, rnea, rotation, tip_motion};
+
+    #[test]
+    fn seen_from_another_frame_an_arm_does_the_same_in_other_axes() {
+        let base = Pose { p: Vector3::new(0.6, -0.1, 0.9), r: rotation::from_rpy(3.0, 0.2, -0.4) };
+        let to = base.r.transpose();
+        let both = |s: &Spatial| {
+            let (linear, angular) = (to * s.fixed_rows::<3>(0), to * s.fixed_rows::<3>(3));
+            Spatial::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+        };
+        let q = JointVector::from([0.3, -1.0, 0.7, 1.9, -0.4, 0.8, 2.2]);
+        let (qd, qdd) = (q * -0.7, JointVector::repeat(1.5));
+        for arm in [ArmModel::rediestro(), ArmModel::slide(3.0).with_gravity(Vector3::new(0.0, 1.0, -9.0))] {
+            let seen = arm.clone().seen_from(&base);
+            let (there, here) = (tip_motion(&arm, &q, &qd), tip_motion(&seen, &q, &qd));
+            assert!((here.pose.p - to * (there.pose.p - base.p)).amax() < 1e-14);
+            assert!((here.pose.r - to * there.pose.r).amax() < 1e-14);
+            assert!((here.twist - both(&there.twist)).amax() < 1e-14);
+            assert!((here.jdot_qd - both(&there.jdot_qd)).amax() < 1e-13);
+            for i in 0..DOF {
+                assert!((here.jacobian.column(i) - both(&there.jacobian.column(i).into())).amax() < 1e-14);
+            }
+            assert!((rnea(&seen, &q, &qd, &qdd) - rnea(&arm, &q, &qd, &qdd)).amax() < 1e-11);
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! How far an arm reaches: a bound, and a search, since joint limits and twisted links leave no closed form.
 
-use crate::kinematics::Frames;
+use crate::kinematics::frames;
 use crate::model::ArmModel;
 use crate::small::V3;
 use crate::{DOF, JointVector};
@@ -69,8 +69,8 @@ impl ArmModel {
     }
 
     fn stretch(&self, q: &JointVector) -> f64 {
-        let frames = Frames::new(self, q);
-        let d = V3::from(frames.o[DOF]) - V3::from(frames.o[1]);
+        let frames = frames(self, q);
+        let d = V3::from(frames[DOF].o) - V3::from(frames[1].o);
         d.dot(d).sqrt()
     }
 }

@@ -3,9 +3,9 @@
 //! Gravity enters as an upward acceleration of the base. All vectors are in base axes and refer to the tip, so the
 //! outward recursion is a sum from the base and the inward one a sum from the tip.
 
-use crate::bodies::Bodies;
-use crate::kinematics::{Frames, Motion, Screws};
-use crate::lanes::{Lanes, PAIRS, Pair, joints_of, pairs_of, sum_from_base, sum_from_tip};
+use crate::bodies::{Bodies, Wrench, bodies, wrenches};
+use crate::kinematics::{Motion, Screw, Screws, frames, screws};
+use crate::lanes::{Lanes, PAIRS, Pair, from_base, from_tip, joints_of, pairs_of};
 use crate::model::ArmModel;
 use crate::small::{V3, v3};
 use crate::{JointVector, Spatial};
@@ -15,7 +15,7 @@ pub fn rnea(model: &ArmModel, q: &JointVector, qd: &JointVector, qdd: &JointVect
     match &model.slide {
         Some(slide) => slide.rnea(model.gravity, qdd),
         None => {
-            let screws = Screws::new(&Frames::new(model, q));
+            let screws = screws(&frames(model, q));
             let motion = Motion::new(&screws, qd).accelerated(&screws, qdd);
             rnea_in(model, &screws, &motion)
         }
@@ -27,7 +27,7 @@ pub fn bias(model: &ArmModel, q: &JointVector, qd: &JointVector) -> JointVector 
     match &model.slide {
         Some(slide) => slide.rnea(model.gravity, &JointVector::zeros()),
         None => {
-            let screws = Screws::new(&Frames::new(model, q));
+            let screws = screws(&frames(model, q));
             rnea_in(model, &screws, &Motion::new(&screws, qd))
         }
     }
@@ -40,31 +40,25 @@ pub fn gravity_torque(model: &ArmModel, q: &JointVector) -> JointVector {
 
 #[inline(always)]
 pub(crate) fn rnea_in(model: &ArmModel, screws: &Screws, motion: &Motion) -> JointVector {
-    let bodies = Bodies::new(model, screws);
-    joints_of(&joint_torques(model, screws, motion, &bodies, &Spatial::zeros()))
+    let carried = carried(model, motion, &bodies(model, screws), &Spatial::zeros());
+    joints_of(&std::array::from_fn(|k| along(&screws[k], &carried[k])))
 }
 
-/// The inward pass. `f_tip` acts ON the tip.
+/// The inward pass: what each joint carries of the links beyond it. `f_tip` acts ON the tip.
 #[inline(always)]
-pub(crate) fn joint_torques(
-    model: &ArmModel,
-    screws: &Screws,
-    motion: &Motion,
-    bodies: &Bodies,
-    f_tip: &Spatial,
-) -> [Pair; PAIRS] {
-    let mut taken = bodies.wrenches(model.gravity, motion);
+pub(crate) fn carried(model: &ArmModel, motion: &Motion, bodies: &Bodies, f_tip: &Spatial) -> [Wrench<Pair>; PAIRS] {
+    let mut wrenches = wrenches(bodies, model.gravity, motion);
     // the tip itself is no body: its lane has what the surroundings take off link 7
     let at_tip = |k: usize| V3::pair(V3::ZERO, v3(-f_tip[k], -f_tip[k + 1], -f_tip[k + 2]));
-    taken.f[PAIRS - 1] += at_tip(0);
-    taken.n[PAIRS - 1] += at_tip(3);
-    sum_from_tip(&mut taken.f);
-    sum_from_tip(&mut taken.n);
-    let mut tau = [Pair::default(); PAIRS];
-    for k in 0..PAIRS {
-        tau[k] = screws.s[k].dot(taken.f[k]) + screws.r[k].z.dot(taken.n[k]);
-    }
-    tau
+    wrenches[PAIRS - 1].f += at_tip(0);
+    wrenches[PAIRS - 1].n += at_tip(3);
+    from_tip(wrenches)
+}
+
+/// Component of a wrench along a joint: its torque.
+#[inline(always)]
+pub(crate) fn along(screw: &Screw, wrench: &Wrench<Pair>) -> Pair {
+    screw.s.dot(wrench.f) + screw.r.z.dot(wrench.n)
 }
 
 impl Motion {
@@ -72,18 +66,12 @@ impl Motion {
     #[inline(always)]
     pub fn accelerated(&self, screws: &Screws, qdd: &JointVector) -> Motion {
         let qdd = pairs_of(qdd, 0.0);
-        let mut added = Motion::default();
-        for k in 0..PAIRS {
-            added.a[k] = screws.s[k] * qdd[k];
-            added.dw[k] = screws.r[k].z * qdd[k];
+        let a = from_base(std::array::from_fn(|k| screws[k].s * qdd[k]));
+        let dw = from_base(std::array::from_fn(|k| screws[k].r.z * qdd[k]));
+        Motion {
+            a: std::array::from_fn(|k| self.a[k] + a[k]),
+            dw: std::array::from_fn(|k| self.dw[k] + dw[k]),
+            ..*self
         }
-        sum_from_base(&mut added.a);
-        sum_from_base(&mut added.dw);
-        for k in 0..PAIRS {
-            added.a[k] += self.a[k];
-            added.dw[k] += self.dw[k];
-        }
-        (added.v, added.w) = (self.v, self.w);
-        added
     }
 }

@@ -1,26 +1,28 @@
-//! The one-axis test arm: a mass on a frictionless slide along base z, moved by joint 1. Joints 2 to 7 turn unit inertias
+//! The one-axis test arm: a mass on a frictionless slide along its base's z, moved by joint 1. Joints 2 to 7 turn unit inertias
 //! and move nothing. Its dynamics are closed forms, so that a control law can be held against the ideal response.
 
-use crate::kinematics::{Pose, TipMotion};
-use crate::small::V3;
+use crate::kinematics::{Pose, TipMotion, spatial};
+use crate::small::{M3, V3, v3};
 use crate::{Jacobian, JointMatrix, JointVector, Spatial};
-use nalgebra::{Matrix3, Vector3};
 
 /// The mass that joint 1 moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Slide {
     /// Mass (kg).
     pub mass: f64,
+    /// Axes of the slide in the base it is seen from, and its origin (m).
+    pub r: M3,
+    pub p: V3,
 }
 
 impl Slide {
     pub fn pose(&self, q: &JointVector) -> Pose {
-        Pose { p: Vector3::new(0.0, 0.0, q[0]), r: Matrix3::identity() }
+        Pose { p: (self.p + self.r.z * q[0]).into(), r: self.r.into() }
     }
 
     pub fn jacobian(&self) -> Jacobian {
         let mut j = Jacobian::zeros();
-        j[(2, 0)] = 1.0;
+        j.set_column(0, &spatial(self.r.z, V3::ZERO));
         j
     }
 
@@ -29,13 +31,13 @@ impl Slide {
             pose: self.pose(q),
             jacobian: self.jacobian(),
             jdot_qd: Spatial::zeros(),
-            twist: Spatial::new(0.0, 0.0, qd[0], 0.0, 0.0, 0.0),
+            twist: spatial(self.r.z * qd[0], V3::ZERO),
         }
     }
 
     pub fn rnea(&self, gravity: V3, qdd: &JointVector) -> JointVector {
         let mut tau = *qdd;
-        tau[0] = self.mass * (qdd[0] - gravity.z);
+        tau[0] = self.mass * (qdd[0] - gravity.dot(self.r.z));
         tau
     }
 
@@ -47,8 +49,13 @@ impl Slide {
 
     pub fn aba(&self, gravity: V3, tau: &JointVector, armature: &JointVector, f_tip: &Spatial) -> JointVector {
         let mut qdd = tau.zip_map(armature, |t, a| t / (1.0 + a));
-        qdd[0] = (tau[0] + self.mass * gravity.z + f_tip[2]) / (self.mass + armature[0]);
+        let force = v3(f_tip[0], f_tip[1], f_tip[2]) + gravity * self.mass;
+        qdd[0] = (tau[0] + force.dot(self.r.z)) / (self.mass + armature[0]);
         qdd
+    }
+
+    pub fn potential_energy(&self, gravity: V3, q: &JointVector) -> f64 {
+        -self.mass * gravity.dot(self.p + self.r.z * q[0])
     }
 }
 

@@ -7,13 +7,22 @@
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// What a component may be.
-pub(crate) trait Real:
+/// What a component may be: a number, or one for each of two joints ([`crate::Pair`]), so that what is the same for all
+/// joints is written once and computed two at a time.
+pub trait Real:
     Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
+    /// The same number for both joints.
+    fn of(x: f64) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// Cut to ±`limit`, which is not negative; what is no number stays so.
+    fn within(self, limit: Self) -> Self;
+    /// Sine and cosine of an angle (rad), to the last bit or two.
+    fn sin_cos(self) -> (Self, Self);
+    /// e⁻ˣ of what is not negative, to the last bit of 1.
+    fn exp_minus(self) -> Self;
 }
-
-impl Real for f64 {}
 
 /// A 3-vector.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -106,6 +115,30 @@ impl<T: Real> Sym3<T> {
         }
     }
 
+    /// `a bᵀ + b aᵀ` of two pairs (a, b), added.
+    #[inline(always)]
+    pub fn outer_sums((a, b): (V3<T>, V3<T>), (c, d): (V3<T>, V3<T>)) -> Sym3<T> {
+        let (x, y, z) = (a.x * b.x + c.x * d.x, a.y * b.y + c.y * d.y, a.z * b.z + c.z * d.z);
+        Sym3 {
+            xx: x + x,
+            yy: y + y,
+            zz: z + z,
+            xy: (a.x * b.y + a.y * b.x) + (c.x * d.y + c.y * d.x),
+            xz: (a.x * b.z + a.z * b.x) + (c.x * d.z + c.z * d.x),
+            yz: (a.y * b.z + a.z * b.y) + (c.y * d.z + c.z * d.y),
+        }
+    }
+
+    /// `(tr(self)·1 − self) v`: angular momentum of these second moments at angular velocity `v`.
+    #[inline(always)]
+    pub fn momentum(self, v: V3<T>) -> V3<T> {
+        v3(
+            (self.yy + self.zz) * v.x - (self.xy * v.y + self.xz * v.z),
+            (self.xx + self.zz) * v.y - (self.xy * v.x + self.yz * v.z),
+            (self.xx + self.yy) * v.z - (self.xz * v.x + self.yz * v.y),
+        )
+    }
+
     #[inline(always)]
     pub fn trace(self) -> T {
         self.xx + self.yy + self.zz
@@ -130,6 +163,10 @@ impl Sym3 {
     /// `−([a]ₓ[b]ₓ + [b]ₓ[a]ₓ)`: how the inertia tensor of a body with first moment `b` grows when its reference point moves.
     pub fn shift(a: V3, b: V3) -> Sym3 {
         Sym3::outer_sum(a, b).complement()
+    }
+
+    pub fn with_halved_diagonal(self) -> Sym3 {
+        Sym3 { xx: 0.5 * self.xx, yy: 0.5 * self.yy, zz: 0.5 * self.zz, ..self }
     }
 
     /// `tr(self)·1 − self`: the inertia tensor of these second moments.
@@ -284,7 +321,15 @@ mod tests {
         let full = |s: Sym3| Matrix3::new(s.xx, s.xy, s.xz, s.xy, s.yy, s.yz, s.xz, s.yz, s.zz);
         assert!((full(s.rotated(r.into())) - r * full(s) * r.transpose()).amax() < 1e-15);
 
+        let v = Vector3::new(0.5, -1.5, 2.0);
+        let momentum: Vector3<f64> = s.momentum(v.into()).into();
+        assert!((momentum - (v * s.trace() - full(s) * v)).amax() < 1e-15);
+
         let (a, b) = (Vector3::new(0.3, -0.7, 1.1), Vector3::new(-2.0, 0.4, 0.9));
+        let sums = full(Sym3::outer_sums((a.into(), b.into()), (b.into(), v.into())));
+        assert!(
+            (sums - (a * b.transpose() + b * a.transpose() + b * v.transpose() + v * b.transpose())).amax() < 1e-14
+        );
         let (ax, bx) = (a.cross_matrix(), b.cross_matrix());
         assert!((full(Sym3::shift(a.into(), b.into())) + ax * bx + bx * ax).amax() < 1e-15);
     }

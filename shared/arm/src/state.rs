@@ -4,14 +4,14 @@
 //! them: through this type the joint frames are computed once.
 
 use crate::aba::aba_in;
-use crate::bodies::Bodies;
+use crate::bodies::bodies;
 use crate::crba::crba_in;
 use crate::forward::accelerations;
-use crate::kinematics::{Frames, Motion, Pose, Screws, TipMotion, tip_motion_of};
-use crate::lanes::{lane, sum_from_tip};
+use crate::kinematics::{Motion, Pose, Screws, TipMotion, frames, jacobian_of, jacobian_times, screws, tip_motion_of};
+use crate::lanes::{from_tip, lane};
 use crate::model::ArmModel;
 use crate::rnea::rnea_in;
-use crate::{Jacobian, JointMatrix, JointVector, Spatial};
+use crate::{DOF, Jacobian, JointMatrix, JointVector, Spatial};
 
 /// An arm at angles q and speeds q̇.
 #[derive(Clone, Copy, Debug)]
@@ -28,9 +28,9 @@ impl<'m> ArmState<'m> {
     /// The state at joint angles `q` (rad) and speeds `qd` (rad/s).
     #[inline]
     pub fn new(model: &'m ArmModel, q: &JointVector, qd: &JointVector) -> ArmState<'m> {
-        let frames = Frames::new(model, q);
-        let screws = Screws::new(&frames);
-        ArmState { model, pose: frames.pose(), screws, motion: Motion::new(&screws, qd), q: *q, qd: *qd }
+        let frames = frames(model, q);
+        let screws = screws(&frames);
+        ArmState { model, pose: frames[DOF].pose(), screws, motion: Motion::new(&screws, qd), q: *q, qd: *qd }
     }
 
     /// See [`crate::forward_kinematics`].
@@ -45,7 +45,7 @@ impl<'m> ArmState<'m> {
     pub fn jacobian(&self) -> Jacobian {
         match &self.model.slide {
             Some(slide) => slide.jacobian(),
-            None => self.screws.jacobian(),
+            None => jacobian_of(&self.screws),
         }
     }
 
@@ -69,7 +69,7 @@ impl<'m> ArmState<'m> {
     pub fn tip_acceleration(&self, qdd: &JointVector) -> Spatial {
         match &self.model.slide {
             Some(slide) => slide.jacobian() * qdd,
-            None => self.motion.accelerated(&self.screws, qdd).tip().1,
+            None => self.motion.tip().1 + jacobian_times(&self.screws, qdd),
         }
     }
 
@@ -111,11 +111,10 @@ impl<'m> ArmState<'m> {
     /// Potential energy of the links' weight, counted from the base's origin (J).
     pub fn potential_energy(&self) -> f64 {
         match &self.model.slide {
-            Some(slide) => -slide.mass * self.model.gravity.z * self.q[0],
+            Some(slide) => slide.potential_energy(self.model.gravity, &self.q),
             None => {
-                let Bodies { mut first, .. } = Bodies::new(self.model, &self.screws);
-                sum_from_tip(&mut first);
-                -self.model.gravity.dot(lane(&first, 0) + self.model.chain.fixed)
+                let all = lane(&from_tip(bodies(self.model, &self.screws)), 0);
+                -self.model.gravity.dot(all.first + self.model.chain.fixed)
             }
         }
     }

@@ -6,6 +6,7 @@
 use arm::drives::DriveData;
 use hw_sim::contact::Contact;
 use hw_sim::drive::Drive;
+use hw_sim::drives::Drives;
 use hw_sim::energy;
 use hw_sim::integrate;
 use hw_sim::plant::{Actuation, Plant};
@@ -93,9 +94,9 @@ fn build(scenario: &Scenario, case: Case, lossless: bool) -> Result<(Plant, Stat
         for joint in &mut data.joints {
             joint.damping_ratio = 0.0;
         }
-        plant.drives = std::array::from_fn(|i| {
+        plant.drives = Drives::new(std::array::from_fn(|i| {
             Drive::new(&data.joints[i], 0.0, true, data.joints[i].rotor_inertia_at_output_kg_m2)
-        });
+        }));
         for contact in &mut plant.contacts {
             if let Contact::Plane(plane) = contact {
                 plane.material.friction = 0.0;
@@ -126,7 +127,7 @@ fn simulate(scenario: &Scenario, case: Case, integrator: Integrator, rate: f64) 
         if n % every == 0 {
             samples.push(Track { height: now.pose.p.z, force: now.touch.wrench[2] });
         }
-        integrate::step(&plant, integrator, &mut state, &now, &actuation, h);
+        integrate::step(&plant, integrator, &mut state, &now, &actuation, &now.motor, h);
     }
     Ok(Run { samples, ns_per_step: start.elapsed().as_nanos() as f64 / steps as f64 })
 }
@@ -150,7 +151,7 @@ fn drift(scenario: &Scenario, case: Case, integrator: Integrator, rate: f64) -> 
     let mut worst: f64 = 0.0;
     for _ in 0..(SPAN * rate) as usize {
         let now = plant.evaluate(&state, &actuation);
-        integrate::step(&plant, integrator, &mut state, &now, &actuation, 1.0 / rate);
+        integrate::step(&plant, integrator, &mut state, &now, &actuation, &now.motor, 1.0 / rate);
         worst = worst.max((total(&state) - start).abs());
     }
     Ok(Some(worst))

@@ -1,7 +1,9 @@
 //! The plant on the rack's time: steps on a fixed grid, actuation at its exact instants, samples for the wires.
 //!
-//! The committed state moves only to points of the grid and to instants of amplifier commands. What is asked for at any
-//! other instant (the end of a window) is found by a trial step that is thrown away, so the motion does not depend on where
+//! The committed state moves only to points of the grid and to instants at which brakes or faults act. Motor torques that
+//! change within a step act in it from their instants on, as their mean over the step: behind flexible joints nothing but
+//! the rotors feels them at once. Where a step cannot take them so, they split it too. What is asked for at any other
+//! instant (the end of a window) is found by a trial step that is thrown away, so the motion does not depend on where
 //! windows are cut. A closing limit switch or a tripping amplifier ends the window there. A runaway freezes the arm: the
 //! last good values are repeated with [`drive_status::DIVERGED`] set.
 
@@ -14,7 +16,7 @@ use arm::{DOF, JointVector, Pose, rotation};
 use board::{Board, Inputs, Outputs};
 use messages::{AmplifierCommand, Event, EventKind, Ns, PlantProbe, PlantSample, Severity, drive_status};
 use nalgebra::Vector3;
-use scenario::{Integrator, Scenario};
+use scenario::{Integrator, Joints, Scenario};
 
 /// Most amplifier commands that may wait for their time; of more, which only outputs gone wrong send, the oldest are lost.
 const PENDING: usize = 256;
@@ -24,6 +26,8 @@ pub struct HwSim {
     plant: Plant,
     task_frame: Pose,
     integrator: Integrator,
+    /// A step takes motor torques that change within it.
+    takes_changes: bool,
     /// Distance of the grid's points, ns.
     grid: Ns,
     runaway: f64,
@@ -51,11 +55,13 @@ impl HwSim {
     /// The hardware of a scenario, at rest on its brakes. The message says what cannot be simulated.
     pub fn new(scenario: &Scenario) -> Result<HwSim, String> {
         let (plant, state) = Plant::new(scenario)?;
+        let integrator = scenario.plant.integrator;
         let now = plant.evaluate(&state, &Actuation::SAFE);
         let mut sim = HwSim {
+            takes_changes: plant.joints == Joints::Flexible && integrator == Integrator::SemiImplicit,
             plant,
             task_frame: scenario.task_frame(),
-            integrator: scenario.plant.integrator,
+            integrator,
             grid: scenario::nanoseconds(1.0 / scenario.plant.rate_hz),
             runaway: scenario.plant.runaway_rad_per_s,
             t: 0,
@@ -101,9 +107,20 @@ impl HwSim {
         status
     }
 
-    /// Applies the commands whose time has come.
-    fn actuate(&mut self) {
-        let due = self.pending.iter().take_while(|command| command.t <= self.t).count();
+    /// What the drives make of a command.
+    fn actuation_of(&self, command: &AmplifierCommand) -> Actuation {
+        self.faults.spoil(Actuation::from_command(command))
+    }
+
+    /// Commands that wait for a time before `until`.
+    fn waiting(&self, until: Ns) -> &[AmplifierCommand] {
+        let due = self.pending.iter().take_while(|command| command.t < until).count();
+        &self.pending[..due]
+    }
+
+    /// Applies the commands whose time is before `until`.
+    fn actuate(&mut self, until: Ns) {
+        let due = self.waiting(until).len();
         if let Some(last) = self.pending[..due].last() {
             self.commanded = Actuation::from_command(last);
         }
@@ -126,6 +143,26 @@ impl HwSim {
         self.pending.drain(..due);
     }
 
+    /// Where the next step ends: at the grid's next point, or before it where something acts that a step cannot take.
+    fn next_stop(&self) -> Ns {
+        let stop = ((self.t / self.grid + 1) * self.grid).min(self.faults.next_change());
+        let splits = |command: &&AmplifierCommand| {
+            !self.takes_changes || !self.actuation_of(command).brakes_like(&self.actuation)
+        };
+        self.waiting(stop).iter().find(splits).map_or(stop, |command| command.t)
+    }
+
+    /// Motor torques (Nm) in the step to `until`: their mean, each from its command's instant on.
+    fn motor_until(&self, until: Ns) -> JointVector {
+        let (mut mean, mut motor) = (self.now.motor, self.now.motor);
+        for command in self.waiting(until) {
+            let next = self.plant.drives.motor_torques(&self.actuation_of(command));
+            mean += (next - motor) * (seconds(until - command.t) / seconds(until - self.t));
+            motor = next;
+        }
+        mean
+    }
+
     /// Lets the drives' faults begin and end that do so up to now.
     fn break_down(&mut self, out: &mut Outputs) {
         let changed = self.faults.advance(self.t, |fault, from| {
@@ -140,9 +177,11 @@ impl HwSim {
     /// Carries the committed state to `t`. False where it leaves its domain; then nothing asks for it again.
     fn commit(&mut self, t: Ns, out: &mut Outputs) -> bool {
         self.evaluate();
-        integrate::step(&self.plant, self.integrator, &mut self.state, &self.now, &self.actuation, seconds(t - self.t));
+        let (motor, h) = (self.motor_until(t), seconds(t - self.t));
+        integrate::step(&self.plant, self.integrator, &mut self.state, &self.now, &self.actuation, &motor, h);
         self.t = t;
         self.known = false;
+        self.actuate(t);
         if let Some((joint, value)) = self.state.out_of_domain(self.runaway) {
             self.status |= drive_status::DIVERGED;
             let value = if value.is_finite() { value } else { f64::MAX };
@@ -166,7 +205,7 @@ impl HwSim {
     }
 
     fn sample_of(&self, t: Ns, state: &State, now: &Evaluation) -> PlantSample {
-        let shaft = |v: &JointVector| std::array::from_fn(|i| v[i] * self.plant.drives[i].gear_ratio);
+        let shaft = |v: &JointVector| v.component_mul(&self.plant.drives.gear_ratio).into();
         PlantSample {
             t,
             wrench: self.plant.sensor.wrench(now),
@@ -194,7 +233,7 @@ impl HwSim {
             theta_dot: state.theta_dot.into(),
             motor_torque: now.motor.into(),
             spring_torque: now.transmitted.into(),
-            friction_torque: std::array::from_fn(|i| now.loss[i].friction),
+            friction_torque: now.loss.friction.into(),
             position: position.into(),
             orientation: [q[3] * sign, q[0] * sign, q[1] * sign, q[2] * sign],
             contact: [force.x, force.y, force.z, moment.x, moment.y, moment.z],
@@ -212,9 +251,10 @@ impl HwSim {
         if self.t == until {
             self.last_probe = self.probe_of(until, &self.state, &self.now);
         } else {
-            let (mut state, h) = (self.state, seconds(until - self.t));
-            integrate::step(&self.plant, self.integrator, &mut state, &self.now, &self.actuation, h);
-            let now = self.plant.evaluate(&state, &self.actuation);
+            let (mut state, motor, h) = (self.state, self.motor_until(until), seconds(until - self.t));
+            integrate::step(&self.plant, self.integrator, &mut state, &self.now, &self.actuation, &motor, h);
+            let actuation = self.waiting(until).last().map_or(self.actuation, |last| self.actuation_of(last));
+            let now = self.plant.evaluate(&state, &actuation);
             if state.out_of_domain(self.runaway).is_some() {
                 // the next step of the grid will find it too and say so
                 return self.repeat(until, out);
@@ -252,7 +292,7 @@ impl Board for HwSim {
         self.pending.extend_from_slice(&inputs.mail.amplifier);
         self.pending.drain(..self.pending.len().saturating_sub(PENDING));
         if inputs.boot {
-            self.actuate();
+            self.actuate(1);
             self.sample(out);
             self.finish_window(inputs.until, out);
             return;
@@ -263,11 +303,11 @@ impl Board for HwSim {
         }
         self.break_down(out);
         loop {
-            self.actuate();
-            let command = self.pending.first().map_or(Ns::MAX, |command| command.t).min(self.faults.next_change());
-            let grid = (self.t / self.grid + 1) * self.grid;
-            let next = grid.min(command);
-            if next > inputs.until || next == inputs.until && command == next && grid != next {
+            self.actuate(self.t + 1);
+            let next = self.next_stop();
+            let on_grid = next % self.grid == 0;
+            // what acts at the window's very end is the next one's
+            if next > inputs.until || next == inputs.until && !on_grid {
                 break;
             }
             let switches = self.status;
@@ -276,7 +316,7 @@ impl Board for HwSim {
             }
             self.break_down(out);
             let closed = self.status & !switches & (drive_status::LIMIT_SWITCH | drive_status::AMPLIFIER_TRIPPED) != 0;
-            if next == grid || closed {
+            if on_grid || closed {
                 self.sample(out);
             }
             if closed && next < inputs.until {

@@ -17,7 +17,7 @@ pub fn mechanical(plant: &Plant, state: &State) -> f64 {
         let drive = &plant.drives[i];
         energy += 0.5 * drive.rotor * state.theta_dot[i] * state.theta_dot[i];
         if plant.joints == Joints::Flexible {
-            let deflection = drive.transmission(state.theta[i], 0.0, state.q[i], 0.0).deflection;
+            let deflection = drive.transmission(drive.gear(state.theta[i]), 0.0, state.q[i], 0.0).deflection;
             energy += 0.5 * drive.stiffness * deflection * deflection;
         }
     }

@@ -1,25 +1,36 @@
 //! From one instant to the next: semi-implicit Euler and classical Runge–Kutta.
 //!
 //! Bristle deflections move with the speeds that the step ends up with; they are cut to what friction can hold when the
-//! next state is evaluated. The actuation is constant in a step.
+//! next state is evaluated. The actuation is constant in a step, but the motor torques may change in it where they move
+//! nothing but rotors: semi-implicit Euler takes their mean, and the rotors get the impulse that is theirs.
 
 use crate::plant::{Actuation, Evaluation, Plant};
 use crate::state::State;
-use arm::{DOF, JointVector, Spatial};
+use arm::{JointVector, Spatial};
 use scenario::Integrator;
 
-/// Carries `state`, in which `now` was evaluated, on by `h` seconds.
-pub fn step(plant: &Plant, integrator: Integrator, state: &mut State, now: &Evaluation, actuation: &Actuation, h: f64) {
+/// Carries `state`, in which `now` was evaluated, on by `h` seconds. `motor` are the motor torques' means (Nm), with rigid
+/// joints or Runge–Kutta those of `now`.
+pub fn step(
+    plant: &Plant,
+    integrator: Integrator,
+    state: &mut State,
+    now: &Evaluation,
+    actuation: &Actuation,
+    motor: &JointVector,
+    h: f64,
+) {
     match integrator {
-        Integrator::SemiImplicit => semi_implicit(plant, state, now, h),
+        Integrator::SemiImplicit => semi_implicit(plant, state, now, motor, h),
         Integrator::Rk4 => rk4(plant, state, now, actuation, h),
     }
 }
 
 /// Speeds first, then positions with the new speeds: symplectic for the conservative part, one evaluation a step.
-fn semi_implicit(plant: &Plant, state: &mut State, now: &Evaluation, h: f64) {
+fn semi_implicit(plant: &Plant, state: &mut State, now: &Evaluation, motor: &JointVector, h: f64) {
     let qd = state.qd + now.qdd * h;
-    let theta_dot = state.theta_dot + now.theta_ddot * h;
+    let theta_ddot = now.theta_ddot + (motor - now.motor).component_mul(&plant.drives.mobility);
+    let theta_dot = state.theta_dot + theta_ddot * h;
     state.qd = qd;
     state.theta_dot = theta_dot;
     let twist = now.twist + now.acceleration * h;
@@ -37,12 +48,10 @@ fn drift(
     h: f64,
 ) {
     state.q += qd * h;
-    state.theta += theta_dot * h;
-    for i in 0..DOF {
-        let moved = theta_dot[i] * h;
-        state.presliding[i] = now.loss[i].presliding + moved;
-        state.brake[i] = now.loss[i].brake_deflection + moved;
-    }
+    let moved = theta_dot * h;
+    state.theta += moved;
+    state.presliding = now.loss.presliding + moved;
+    state.brake = now.loss.brake_deflection + moved;
     state.load = now.transmitted;
     plant.advance_contacts(state, now, twist, h);
 }

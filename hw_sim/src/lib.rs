@@ -5,6 +5,7 @@
 //! | `board` | windows, samples on the wires, limit switches, the end of a runaway |
 //! | `plant` | forces and accelerations in one state |
 //! | `drive`, `friction` | amplifier, rotor, brake, transmission; sticking and sliding |
+//! | `drives` | all joints', two at a time |
 //! | `contact` | what the tool touches |
 //! | `sensor` | what the strain gauges feel |
 //! | `integrate` | from one instant to the next |
@@ -13,6 +14,7 @@
 mod board;
 pub mod contact;
 pub mod drive;
+pub mod drives;
 pub mod energy;
 mod faults;
 pub mod friction;

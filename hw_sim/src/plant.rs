@@ -4,7 +4,8 @@
 //! N²J_m (θ̈/N) = τ_m − τ_f − τ_brake − τ_s on the motor side. Rigid joints: (M + N²J_m)q̈ + h = τ_m − τ_f − τ_brake − JᵀF_e.
 
 use crate::contact::{Contact, PegInHole, Plane, Touch};
-use crate::drive::{Drive, RotorLoss, Transmission};
+use crate::drive::Drive;
+use crate::drives::{Drives, Driving, Losses};
 use crate::sensor::Sensor;
 use crate::state::{CONTACT_POINTS, State};
 use arm::{ArmModel, ArmState, DOF, JointVector, Pose, Spatial};
@@ -17,7 +18,7 @@ pub struct Plant {
     /// The arm as it is (not as the controller knows it).
     pub arm: ArmModel,
     /// One drive per joint.
-    pub drives: [Drive; DOF],
+    pub drives: Drives,
     /// Flexible or rigid transmissions.
     pub joints: Joints,
     /// What the tool may touch.
@@ -53,6 +54,16 @@ impl Actuation {
             brake_share: [1.0; DOF],
         }
     }
+
+    /// Share of its torque that each joint's brake holds, 0 = released.
+    pub fn held(&self) -> [f64; DOF] {
+        std::array::from_fn(|i| if self.braked & (1 << i) != 0 { self.brake_share[i] } else { 0.0 })
+    }
+
+    /// The brakes are told the same.
+    pub fn brakes_like(&self, other: &Actuation) -> bool {
+        self.braked == other.braked && self.brake_share == other.brake_share
+    }
 }
 
 /// Forces and accelerations in one state.
@@ -65,7 +76,7 @@ pub struct Evaluation {
     /// Motor torques, Nm.
     pub motor: JointVector,
     /// Friction and brakes.
-    pub loss: [RotorLoss; DOF],
+    pub loss: Losses,
     /// Torques through the transmissions, Nm.
     pub transmitted: JointVector,
     /// Pose of the tool.
@@ -98,10 +109,10 @@ impl Plant {
             contact.limit_damping(LARGEST_DAMPER_STEP * plant.rate_hz / mobility);
         }
         let plant = Plant {
-            drives: std::array::from_fn(|i| {
+            drives: Drives::new(std::array::from_fn(|i| {
                 let braked = stiffness.braked_inertia[i];
                 Drive::new(&data.joints[i], plant.friction_scale, plant.kinematic_error, braked)
-            }),
+            })),
             joints: plant.joints,
             contacts,
             sensor: Sensor::new(&scenario.arm, &arm),
@@ -122,7 +133,7 @@ impl Plant {
             let mut on_rotor = torque;
             if self.joints == Joints::Flexible {
                 state.theta[i] = drive.motor_angle_under(torque, q[i]);
-                on_rotor = drive.transmission(state.theta[i], 0.0, q[i], 0.0).on_rotor;
+                on_rotor = drive.transmission(drive.gear(state.theta[i]), 0.0, q[i], 0.0).on_rotor;
             }
             state.brake[i] = drive.brake_deflection_under(-on_rotor);
         }
@@ -135,36 +146,21 @@ impl Plant {
         let (pose, twist) = (arm.pose(), arm.twist());
         let touch = self.touch(&pose, &twist, state);
         let f_tip = -touch.wrench;
-        let motor = JointVector::from_fn(|i, _| self.drives[i].motor_torque(actuation.volts[i]));
-        let mut loss = [RotorLoss::default(); DOF];
-        let mut theta_ddot = JointVector::zeros();
-        let mut transmitted = JointVector::zeros();
-        let braked = |i: usize| if actuation.braked & (1 << i) != 0 { actuation.brake_share[i] } else { 0.0 };
-        let qdd = match self.joints {
+        let motor = self.drives.motor_torques(actuation);
+        let (qdd, driving) = match self.joints {
             Joints::Flexible => {
-                for (i, drive) in self.drives.iter().enumerate() {
-                    let Transmission { on_link, on_rotor, .. } =
-                        drive.transmission(state.theta[i], state.theta_dot[i], state.q[i], state.qd[i]);
-                    loss[i] = drive.loss(state.presliding[i], state.brake[i], state.theta_dot[i], on_link, braked(i));
-                    theta_ddot[i] = (motor[i] - loss[i].friction - loss[i].brake - on_rotor) * drive.mobility;
-                    transmitted[i] = on_link;
-                }
-                arm.accelerations(&transmitted, &JointVector::zeros(), &f_tip)
+                let driving = self.drives.flexible(state, actuation, &motor);
+                (arm.accelerations(&driving.on_link, &JointVector::zeros(), &f_tip), driving)
             }
             Joints::Rigid => {
-                let mut rotors = JointVector::zeros();
-                let mut driving = motor;
-                for (i, drive) in self.drives.iter().enumerate() {
-                    loss[i] = drive.loss(state.presliding[i], state.brake[i], state.qd[i], state.load[i], braked(i));
-                    driving[i] -= loss[i].friction + loss[i].brake;
-                    rotors[i] = drive.rotor;
-                }
-                let qdd = arm.accelerations(&driving, &rotors, &f_tip);
-                theta_ddot = qdd;
-                transmitted = driving - rotors.component_mul(&qdd);
-                qdd
+                let loss = self.drives.rigid(state, actuation);
+                let torque = motor - loss.friction - loss.brake;
+                let rotors = self.drives.rotor;
+                let qdd = arm.accelerations(&torque, &rotors, &f_tip);
+                (qdd, Driving { loss, theta_ddot: qdd, on_link: torque - rotors.component_mul(&qdd) })
             }
         };
+        let Driving { loss, theta_ddot, on_link: transmitted } = driving;
         let acceleration = arm.tip_acceleration(&qdd);
         Evaluation { qdd, theta_ddot, motor, loss, transmitted, pose, twist, acceleration, touch }
     }

@@ -4,6 +4,7 @@ mod common;
 
 use common::scenario;
 use hw_sim::drive::Drive;
+use hw_sim::drives::Drives;
 use hw_sim::integrate;
 use hw_sim::plant::{Actuation, Plant};
 use hw_sim::state::State;
@@ -43,7 +44,7 @@ fn run(
     let mut n = 0.0;
     while !stop(state, n * h) && n * h < 20.0 {
         let now = plant.evaluate(state, actuation);
-        integrate::step(plant, integrator, state, &now, actuation, h);
+        integrate::step(plant, integrator, state, &now, actuation, &now.motor, h);
         n += 1.0;
     }
     n * h
@@ -125,7 +126,8 @@ fn motor_and_link_swing_against_each_other_at_the_two_mass_frequency() {
     plant.joints = Joints::Flexible;
     let mut data = arm::drives::DriveData::rediestro().joints[0].clone();
     data.damping_ratio = 0.0;
-    plant.drives[0] = Drive::new(&data, 0.0, false, 1.0);
+    let slide_drive = Drive::new(&data, 0.0, false, 1.0);
+    plant.drives = Drives::new(std::array::from_fn(|i| if i == 0 { slide_drive } else { plant.drives[i] }));
     let (k, rotor) = (data.stiffness_nm_per_rad, data.rotor_inertia_at_output_kg_m2);
     let omega = (k * (1.0 / rotor + 1.0 / MASS)).sqrt();
     for (integrator, tolerance) in [(Integrator::SemiImplicit, 1e-4), (Integrator::Rk4, 1e-6)] {
@@ -135,7 +137,7 @@ fn motor_and_link_swing_against_each_other_at_the_two_mass_frequency() {
         let (mut crossings, mut t, mut before, mut at) = (0, 0.0, 1e-3, 0.0);
         while crossings < 40 {
             let now = plant.evaluate(&state, &push(0.0));
-            integrate::step(&plant, integrator, &mut state, &now, &push(0.0), STEP);
+            integrate::step(&plant, integrator, &mut state, &now, &push(0.0), &now.motor, STEP);
             let deflection = state.theta[0] - state.q[0];
             if before > 0.0 && deflection <= 0.0 {
                 crossings += 1;
@@ -160,7 +162,7 @@ fn a_very_stiff_transmission_moves_like_a_rigid_one() {
                 joint.stiffness_nm_per_rad *= 300.0;
                 joint.damping_ratio = 0.3;
             }
-            plant.drives = std::array::from_fn(|i| Drive::new(&data.joints[i], 0.0, false, 1.0));
+            plant.drives = Drives::new(std::array::from_fn(|i| Drive::new(&data.joints[i], 0.0, false, 1.0)));
             state = plant.braked_at_rest(state.q);
         }
         state.brake.fill(0.0);
@@ -190,7 +192,7 @@ fn slow_friction_reaches_30_percent_of_the_gravity_torque_at_the_table_top() {
         let shares: Vec<f64> = (0..7)
             .filter(|&i| state.load[i].abs() >= 15.0)
             .map(|i| {
-                (now.loss[i].friction * direction - data.joints[i].viscous_nms_per_rad * 0.05) / state.load[i].abs()
+                (now.loss.friction[i] * direction - data.joints[i].viscous_nms_per_rad * 0.05) / state.load[i].abs()
             })
             .collect();
         let most = shares.iter().copied().fold(0.0, f64::max);

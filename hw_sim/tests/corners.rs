@@ -23,7 +23,7 @@ fn press(scenario: &Scenario, integrator: Integrator) -> f64 {
         let actuation = Actuation { volts: if n < steps / 2 { down } else { up }, braked: 0, ..Actuation::SAFE };
         let now = plant.evaluate(&state, &actuation);
         greatest = greatest.max(now.touch.wrench.fixed_rows::<3>(0).norm());
-        integrate::step(&plant, integrator, &mut state, &now, &actuation, 1.0 / scenario.plant.rate_hz);
+        integrate::step(&plant, integrator, &mut state, &now, &actuation, &now.motor, 1.0 / scenario.plant.rate_hz);
         assert_eq!(state.out_of_domain(3.0), None, "{:?} {integrator:?} step {n}", scenario.surfaces);
     }
     greatest

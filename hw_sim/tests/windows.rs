@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Bench, free, scenario};
-use messages::{EventKind, PlantSample, drive_status};
+use messages::{AmplifierCommand, EventKind, PlantSample, drive_status};
 use scenario::{Joints, Robot, Scenario};
 
 /// A mass of 10 kg on the slide, base z = 0.9 m − task z, rigid, nothing to touch.
@@ -81,6 +81,50 @@ fn a_torque_acts_from_its_exact_instant_on() {
     let probe = bench.out.mail.plant_probe[0];
     assert!((probe.qd[0] - a * t1).abs() < 1e-11, "{} {}", probe.qd[0], a * t1);
     assert!((probe.q[0] - (0.5 * a * t1 * t1 + a * t1 * t2)).abs() < 1e-12);
+}
+
+#[test]
+fn behind_flexible_joints_a_torque_that_changes_within_a_step_gives_the_rotors_its_exact_impulse() {
+    let scenario = scenario(&["plant.friction_scale=0"]);
+    let volts = |joint: usize, volts: f64| {
+        let mut all = [0.0; 7];
+        all[joint] = volts;
+        all
+    };
+    // rotor speeds at 0.1 ms, all in the first step
+    let speeds = |commands: &[AmplifierCommand]| {
+        let mut bench = Bench::new(&scenario);
+        bench.window(0, &[free(0, [0.0; 7])]);
+        bench.window(100_000, commands);
+        bench.sim.state().theta_dot
+    };
+    let drives = scenario.drives().expect("valid");
+    let coasting = speeds(&[]);
+    for joint in 0..7 {
+        let data = &drives.joints[joint];
+        let kicked = speeds(&[free(20_000, volts(joint, 2.0)), free(70_001, volts(joint, -1.0))]);
+        let impulse = data.amplifier_nm_per_v * (2.0 * 50_001e-9 - 29_999e-9);
+        let gained = (kicked - coasting) * data.rotor_inertia_at_output_kg_m2;
+        for other in 0..7 {
+            let expected = if other == joint { impulse } else { 0.0 };
+            assert!((gained[other] - expected).abs() < 1e-15, "{joint}: {gained}, expected {impulse}");
+        }
+    }
+}
+
+#[test]
+fn a_brake_acts_from_its_exact_instant_on_and_torques_that_change_before_it_too() {
+    let scenario = scenario(&["plant.friction_scale=0"]);
+    let pushed = free(20_000, [0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let braked = AmplifierCommand { t: 60_000, brake_released: 0, ..pushed };
+    let mut bench = Bench::new(&scenario);
+    bench.window(0, &[free(0, [0.0; 7])]);
+    bench.window(60_000, &[pushed]);
+    let speed = bench.out.mail.plant_probe[0].theta_dot[1];
+    bench.window(100_000, &[braked]);
+    // deflected by what the rotor has moved since: at most twice as fast, pushed as long again, and held a little
+    let share = bench.sim.state().brake[1] / (speed * 40e-6);
+    assert!(speed > 0.0 && (1.0..2.0).contains(&share), "{speed} {share}");
 }
 
 #[test]

@@ -83,16 +83,13 @@ impl Disturbance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::TaskFrame;
     use arm::drives::DriveData;
-    use arm::{ArmModel, Pose, aba};
+    use arm::{ArmModel, aba};
 
     #[test]
     fn a_sound_arm_shows_nothing_and_a_torque_that_does_not_arrive_shows_whole() {
         let model = ArmModel::rediestro();
         let drives = Drives::new(&DriveData::rediestro(), 0.0);
-        // base axes as task axes, so that the wrench is the same in both
-        let frame = TaskFrame::new(&Pose { p: nalgebra::Vector3::zeros(), r: nalgebra::Matrix3::identity() });
         let fe = Spatial::new(2.0, -4.0, 30.0, 0.3, 0.1, -0.2);
         let q = JointVector::from([0.3, -0.4, 0.9, -1.2, 0.5, 0.7, -0.2]);
         let qd = JointVector::repeat(0.1);
@@ -103,7 +100,7 @@ mod tests {
             acting[joint] -= lost;
             let qdd = aba(&model, &q, &qd, &acting, &drives.rotor_inertia, &-fe);
             let arm = ArmState::new(&model, &q, &qd);
-            let tool = frame.kinematics(&arm.tip_motion());
+            let tool = arm.tip_motion();
             let mut disturbance = Disturbance::new();
             for _ in 0..400 {
                 disturbance.sent(&(qd - qdd * dt), Some(sent));
@@ -119,12 +116,11 @@ mod tests {
     fn what_a_sensor_shows_too_much_comes_out_as_that_force() {
         let model = ArmModel::rediestro();
         let drives = Drives::new(&DriveData::rediestro(), 0.0);
-        let frame = TaskFrame::new(&Pose { p: Vector3::zeros(), r: Matrix3::identity() });
         let (fe, bias) = (Spatial::new(2.0, -4.0, 30.0, 0.3, 0.1, -0.2), Vector3::new(-20.0, 9.0, 60.0));
         let q = JointVector::from([0.3, -0.4, 0.9, -1.2, 0.5, 0.7, -0.2]);
         let (qd, dt) = (JointVector::repeat(0.1), 1e-3);
         let arm = ArmState::new(&model, &q, &qd);
-        let tool = frame.kinematics(&arm.tip_motion());
+        let tool = arm.tip_motion();
         let sent = motion_torque(&arm, &drives, &JointVector::zeros()) + contact_torque(&tool, &fe);
         let shown = fe + crate::frame::spatial(bias, Vector3::zeros());
         let mut disturbance = Disturbance::new();

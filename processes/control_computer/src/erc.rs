@@ -3,8 +3,6 @@
 //! It pulls the tool onto the target trajectory, so that what the model does not know (friction above all) ends up as a
 //! bounded difference Xᵗ − X instead of a lost force. Pure arithmetic: nothing here fails.
 
-use crate::frame::{TaskKinematics, difference};
-use crate::target::Target;
 use arm::Spatial;
 
 /// Gains of the error reference controller, the same on all axes.
@@ -17,31 +15,24 @@ pub struct Gains {
 }
 
 /// Ẍʳ = Ẍᵗ + K_v (Ẋᵗ − Ẋ) + K_p (Xᵗ − X).
-pub fn reference_acceleration(gains: &Gains, xt_ddot: &Spatial, target: &Target, tool: &TaskKinematics) -> Spatial {
-    xt_ddot + (target.twist - tool.twist) * gains.kv + difference(&target.pose, &tool.pose) * gains.kp
+pub fn reference_acceleration(gains: &Gains, xt_ddot: &Spatial, error_rate: &Spatial, error: &Spatial) -> Spatial {
+    xt_ddot + error_rate * gains.kv + error * gains.kp
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use arm::{Jacobian, Pose, rotation};
+    use crate::frame::difference;
+    use arm::{Pose, rotation};
     use nalgebra::{Matrix3, Vector3};
 
     #[test]
     fn the_tool_is_accelerated_towards_the_target_and_turned_towards_its_axes() {
-        let target = Target {
-            pose: Pose { p: Vector3::new(0.0, 0.0, 0.01), r: rotation::exp(&Vector3::new(0.0, 0.02, 0.0)) },
-            twist: Spatial::new(0.0, 0.3, 0.0, 0.0, 0.0, 0.1),
-        };
-        let tool = TaskKinematics {
-            pose: Pose { p: Vector3::zeros(), r: Matrix3::identity() },
-            twist: Spatial::new(0.0, 0.1, 0.0, 0.0, 0.0, 0.0),
-            jacobian: Jacobian::zeros(),
-            jdot_qd: Spatial::zeros(),
-        };
-        let xt_ddot = Spatial::repeat(1.0);
+        let target = Pose { p: Vector3::new(0.0, 0.0, 0.01), r: rotation::exp(&Vector3::new(0.0, 0.02, 0.0)) };
+        let tool = Pose { p: Vector3::zeros(), r: Matrix3::identity() };
+        let error_rate = Spatial::new(0.0, 0.2, 0.0, 0.0, 0.0, 0.1);
         let gains = Gains { kp: 100.0, kv: 20.0 };
-        let a = reference_acceleration(&gains, &xt_ddot, &target, &tool);
+        let a = reference_acceleration(&gains, &Spatial::repeat(1.0), &error_rate, &difference(&target, &tool));
         assert!((a - Spatial::new(1.0, 5.0, 2.0, 1.0, 3.0, 3.0)).amax() < 1e-12);
     }
 }

@@ -1,7 +1,7 @@
 //! The task frame C, and differences of poses in it.
 //!
 //! C is fixed in the world, its z points into the surface. The whole law works in its axes, linear part first, moments
-//! about the tool point; the arm library works in base axes. Pure geometry: nothing here fails.
+//! about the tool point; the arm's model takes C for its base. Pure geometry: nothing here fails.
 
 use arm::{Jacobian, JointVector, Pose, Spatial, TipMotion, rotation};
 use nalgebra::{Matrix3, Vector3};
@@ -70,63 +70,8 @@ pub fn rotation_of_wxyz(q: [f64; 4]) -> Matrix3<f64> {
     )
 }
 
-/// Where C lies in the base.
-#[derive(Clone, Copy, Debug)]
-pub struct TaskFrame {
-    origin: Vector3<f64>,
-    /// Base axes to C axes.
-    to_c: Matrix3<f64>,
-}
-
-/// The tool's kinematics in C.
-#[derive(Clone, Copy, Debug)]
-pub struct TaskKinematics {
-    /// X.
-    pub pose: Pose,
-    /// Ẋ = J q̇.
-    pub twist: Spatial,
-    /// J.
-    pub jacobian: Jacobian,
-    /// J̇q̇.
-    pub jdot_qd: Spatial,
-}
-
-impl TaskFrame {
-    /// C at `pose` of the base.
-    pub fn new(pose: &Pose) -> TaskFrame {
-        TaskFrame { origin: pose.p, to_c: pose.r.transpose() }
-    }
-
-    /// A pose of the base, seen in C.
-    pub fn pose(&self, base: &Pose) -> Pose {
-        Pose { p: self.to_c * (base.p - self.origin), r: self.to_c * base.r }
-    }
-
-    /// A free vector of the base, in C axes.
-    pub fn vector(&self, base: &Vector3<f64>) -> Vector3<f64> {
-        self.to_c * base
-    }
-
-    /// A twist, acceleration or wrench about the same point, in C axes.
-    pub fn spatial(&self, base: &Spatial) -> Spatial {
-        spatial(self.to_c * linear(base), self.to_c * angular(base))
-    }
-
-    /// X, Ẋ, J and J̇q̇ rotated into C.
-    pub fn kinematics(&self, tip: &TipMotion) -> TaskKinematics {
-        let mut jacobian = Jacobian::zeros();
-        for i in 0..arm::DOF {
-            let column: Spatial = tip.jacobian.column(i).into();
-            jacobian.set_column(i, &self.spatial(&column));
-        }
-        TaskKinematics {
-            pose: self.pose(&tip.pose),
-            twist: self.spatial(&tip.twist),
-            jacobian,
-            jdot_qd: self.spatial(&tip.jdot_qd),
-        }
-    }
-}
+/// The tool's kinematics in C, X, Ẋ = J q̇, J and J̇q̇: those of an arm seen from C.
+pub type TaskKinematics = TipMotion;
 
 /// Jᵀ F.
 pub fn transposed_times(jacobian: &Jacobian, f: &Spatial) -> JointVector {
@@ -163,17 +108,5 @@ mod tests {
             assert!(q[0] >= 0.0);
             assert!((rotation_of_wxyz(q) - r).amax() < 1e-14);
         }
-    }
-
-    #[test]
-    fn in_a_frame_that_looks_down_a_motion_towards_the_floor_is_along_plus_z() {
-        let frame = TaskFrame::new(&Pose {
-            p: Vector3::new(0.6, 0.0, 0.9),
-            r: rotation::from_rpy(std::f64::consts::PI, 0.0, 0.0),
-        });
-        let down = frame.spatial(&Spatial::new(0.0, 0.0, -1.0, 0.0, 1.0, 0.0));
-        assert!((down - Spatial::new(0.0, 0.0, 1.0, 0.0, -1.0, 0.0)).amax() < 1e-15);
-        let pose = frame.pose(&Pose { p: Vector3::new(0.6, 0.0, 0.8), r: Matrix3::identity() });
-        assert!((pose.p - Vector3::new(0.0, 0.0, 0.1)).amax() < 1e-15);
     }
 }

@@ -144,9 +144,10 @@ impl Law {
         let (target_limited, xt_ddot, xr_ddot);
         match self.scheme {
             Scheme::Modified => {
-                target_limited = target.limit(x, x_dot, &self.bounds);
+                let error;
+                (error, target_limited) = target.limit(x, x_dot, &self.bounds);
                 xt_ddot = target_acceleration(impedance, &xd, &target.pose, &target.twist, fe);
-                xr_ddot = reference_acceleration(&self.gains, &xt_ddot, target, tool);
+                xr_ddot = reference_acceleration(&self.gains, &xt_ddot, &(target.twist - x_dot), &error);
             }
             Scheme::Original => {
                 *target = Target { pose: *x, twist: *x_dot };

@@ -4,7 +4,7 @@
 //! one of the first of two cards, without inverse dynamics. It cannot fail; sensor values that are no numbers give torques
 //! that are none, which the safety state machine sees.
 
-use crate::frame::{TaskFrame, TaskKinematics};
+use crate::frame::TaskKinematics;
 use crate::handover::Wanted;
 use crate::inverse_dynamics::InverseDynamics;
 use crate::law::{Decided, Law};
@@ -54,8 +54,8 @@ pub struct Job {
 /// The pipeline and what it keeps from job to job.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
+    /// Seen from the task frame.
     arm: ArmModel,
-    frame: TaskFrame,
     outer: OuterLoop,
     inverse: InverseDynamics,
 }
@@ -72,8 +72,7 @@ struct OuterLoop {
 impl Pipeline {
     /// The pipeline of this scenario's controller. The message says what is wrong with the arm or its drives.
     pub fn new(scenario: &Scenario) -> Result<Pipeline, String> {
-        let arm = scenario.controller_arm()?;
-        let frame = TaskFrame::new(&scenario.task_frame());
+        let arm = scenario.controller_arm()?.seen_from(&scenario.task_frame());
         let controller = &scenario.controller;
         let tool = controller.tool.as_ref().unwrap_or(&scenario.arm.tool);
         let known = (tool.mass_kg, Vector3::from(tool.com_m));
@@ -82,12 +81,11 @@ impl Pipeline {
             controller.tool_compensation.then_some(known),
             controller.tool_inertia_compensation,
             Vector3::from(scenario.arm.sensor_m),
-            &frame,
             &arm.gravity(),
             (tare > 0).then_some(tare),
         );
         let outer = OuterLoop { tool, law: Law::new(scenario, &arm), trusted: Spatial::zeros() };
-        Ok(Pipeline { frame, outer, inverse: InverseDynamics::new(scenario)?, arm })
+        Ok(Pipeline { outer, inverse: InverseDynamics::new(scenario)?, arm })
     }
 
     /// TG, for the segments that commands bring.
@@ -102,14 +100,13 @@ impl Pipeline {
 
     /// Ends the segment in force and those that wait: X_d rests where the tool is.
     pub fn hold(&mut self, sensed: &Sensed) {
-        let x = arm::forward_kinematics(&self.arm, &sensed.q);
-        self.outer.law.hold(self.frame.pose(&x));
+        self.outer.law.hold(arm::forward_kinematics(&self.arm, &sensed.q));
     }
 
     /// One job at `now`, `dt` seconds after the last one.
     pub fn step(&mut self, now: Ns, dt: f64, sensed: &Sensed, mode: Mode) -> Job {
         let arm = ArmState::new(&self.arm, &sensed.q, &sensed.qd);
-        let tool = self.frame.kinematics(&arm.tip_motion());
+        let tool = arm.tip_motion();
         let mut job = self.outer.decide(now, dt, sensed, &tool, mode);
         self.inverse.observe(&arm, &tool, &sensed.qd, &job.contact.fe, dt);
         (job.torque, job.torque_limited) = self.inverse.torque(&arm, &tool, &job.wanted(), mode);
@@ -125,7 +122,7 @@ impl Pipeline {
     /// One job of the first of two cards; `torque_limited` is what the second card has said last.
     pub fn law_step(&mut self, now: Ns, dt: f64, sensed: &Sensed, mode: Mode, torque_limited: u32) -> Job {
         let arm = ArmState::new(&self.arm, &sensed.q, &sensed.qd);
-        let tool = self.frame.kinematics(&arm.tip_motion());
+        let tool = arm.tip_motion();
         let job = Job { torque_limited, ..self.outer.decide(now, dt, sensed, &tool, mode) };
         self.outer.carry_on(&job, &tool, mode, dt);
         job

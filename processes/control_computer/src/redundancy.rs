@@ -77,16 +77,13 @@ fn normal_matrix(j: &Jacobian, w: &Spatial, diagonal: &JointVector) -> [[f64; DO
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::TaskFrame;
-    use arm::{ArmModel, ArmState, Pose};
-    use nalgebra::{Matrix3, Vector3};
+    use arm::ArmModel;
 
     const TABLE_TOP_DEG: [f64; 7] = [69.2, -15.3, -72.0, -132.4, 159.8, 64.7, 104.0];
 
     fn tool_at(q: &JointVector, qd: &JointVector) -> TaskKinematics {
         let model = ArmModel::rediestro();
-        let base = Pose { p: Vector3::zeros(), r: Matrix3::identity() };
-        TaskFrame::new(&base).kinematics(&ArmState::new(&model, q, qd).tip_motion())
+        arm::tip_motion(&model, q, qd)
     }
 
     fn table_top() -> JointVector {
@@ -184,9 +181,8 @@ mod tests {
     #[test]
     fn one_joint_that_alone_moves_the_tool_needs_no_weight_of_its_own() {
         let model = ArmModel::slide(3.0);
-        let base = Pose { p: Vector3::zeros(), r: Matrix3::identity() };
         let zero = JointVector::zeros();
-        let tool = TaskFrame::new(&base).kinematics(&arm::tip_motion(&model, &zero, &zero));
+        let tool = arm::tip_motion(&model, &zero, &zero);
         let limits = LimitTask::none();
         for others in [1e-3, 0.0] {
             let mut weights = weights(others, 2.0);

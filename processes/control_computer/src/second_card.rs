@@ -5,7 +5,6 @@
 //! and then stops it.
 
 use crate::findings::Findings;
-use crate::frame::TaskFrame;
 use crate::handover::{Ram, Word};
 use crate::inverse_dynamics::InverseDynamics;
 use crate::output::Output;
@@ -26,8 +25,8 @@ pub struct SecondCard {
     first: (u16, Ns),
     program: BusProgram,
     sensors: Sensors,
+    /// Seen from the task frame.
     arm: ArmModel,
-    frame: TaskFrame,
     inverse: InverseDynamics,
     findings: Findings,
     limits: scenario::Safety,
@@ -48,8 +47,7 @@ impl SecondCard {
             first: (first, scenario.rack.tasks[usize::from(first)].period_ns),
             sensors: Sensors::new(scenario, program.sensors())?,
             program,
-            arm: scenario.controller_arm()?,
-            frame: TaskFrame::new(&scenario.task_frame()),
+            arm: scenario.controller_arm()?.seen_from(&scenario.task_frame()),
             inverse: InverseDynamics::new(scenario)?,
             findings: Findings::new(),
             limits: scenario.safety.clone(),
@@ -151,7 +149,7 @@ impl SecondCard {
                 wanted.qdd = sensed.qd * -BRAKING;
             }
             let arm = ArmState::new(&self.arm, &sensed.q, &sensed.qd);
-            let tool = self.frame.kinematics(&arm.tip_motion());
+            let tool = arm.tip_motion();
             self.inverse.observe(&arm, &tool, &sensed.qd, &wanted.fe, dt);
             (self.torque, torque_limited) = self.inverse.torque(&arm, &tool, &wanted, mode);
         }

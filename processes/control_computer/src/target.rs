@@ -45,8 +45,8 @@ impl Target {
     }
 
     /// Holds Xᵗ − X within `bounds` of a tool at `x` moving with `x_dot`, and takes away the part of Ẋᵗ − Ẋ that leads
-    /// out of them. Returns which axes were at their limit: bits 0–2 the translations, bit 3 the rotation.
-    pub fn limit(&mut self, x: &Pose, x_dot: &Spatial, bounds: &Bounds) -> u32 {
+    /// out of them. Returns Xᵗ − X, and which axes were at their limit: bits 0–2 the translations, bit 3 the rotation.
+    pub fn limit(&mut self, x: &Pose, x_dot: &Spatial, bounds: &Bounds) -> (Spatial, u32) {
         let mut acted = 0;
         let mut error = difference(&self.pose, x);
         for (i, &bound) in bounds.linear.iter().enumerate() {
@@ -64,11 +64,13 @@ impl Target {
         if angle > bounds.angular {
             acted |= 8;
             let axis = turn / angle;
-            self.pose.r = rotation::exp(&(axis * bounds.angular)) * x.r;
+            let held = axis * bounds.angular;
+            self.pose.r = rotation::exp(&held) * x.r;
+            error.fixed_rows_mut::<3>(3).copy_from(&held);
             let outward = axis.dot(&(angular(&self.twist) - angular(x_dot))).max(0.0);
             self.twist -= spatial(nalgebra::Vector3::zeros(), axis * outward);
         }
-        acted
+        (error, acted)
     }
 }
 
@@ -160,8 +162,9 @@ mod tests {
             pose: Pose { p: Vector3::new(0.3, -0.05, -0.3), r: rotation::exp(&Vector3::new(0.0, 0.0, 0.5)) },
             twist: Spatial::new(1.0, 1.0, 1.0, 0.3, 0.0, 0.7),
         };
-        let acted = target.limit(&origin(), &Spatial::zeros(), &bounds);
+        let (error, acted) = target.limit(&origin(), &Spatial::zeros(), &bounds);
         assert_eq!(acted, 0b1101);
+        assert!((error - difference(&target.pose, &origin())).amax() < 1e-12, "{error}");
         assert!((target.pose.p - Vector3::new(0.1, -0.05, -0.1)).amax() < 1e-15);
         // outward motion is taken away; y was free and z already comes back
         let left = Spatial::new(0.0, 1.0, 1.0, 0.3, 0.0, 0.0);
@@ -169,7 +172,7 @@ mod tests {
         let back = rotation::log(&target.pose.r);
         assert!((back - Vector3::new(0.0, 0.0, 0.2)).amax() < 1e-12);
         assert_eq!(
-            target.limit(&target.pose.clone(), &Spatial::zeros(), &Bounds { linear: [0.0; 3], angular: 1e-9 }),
+            target.limit(&target.pose.clone(), &Spatial::zeros(), &Bounds { linear: [0.0; 3], angular: 1e-9 }).1,
             0
         );
     }

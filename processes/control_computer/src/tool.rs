@@ -5,7 +5,7 @@
 //! acceleration from the last two speeds measured, half a period late) is subtracted, then the zero offset found by the
 //! tare in free space, and the moment is moved to the tool point. While the tare runs, F_e counts as zero.
 
-use crate::frame::{TaskFrame, angular, linear, spatial};
+use crate::frame::{angular, linear, spatial};
 use arm::{Pose, Spatial};
 use nalgebra::Vector3;
 use vme::Ns;
@@ -49,12 +49,11 @@ pub struct Contact {
 
 impl ToolCompensation {
     /// `tool`: mass and centre of mass from the sensor origin in sensor axes, `None` for no compensation; `sensor`:
-    /// sensor origin from the tool point in tip axes; `gravity` in base axes; a tare until `tare_until`, if any.
+    /// sensor origin from the tool point in tip axes; `gravity` in C; a tare until `tare_until`, if any.
     pub fn new(
         tool: Option<(f64, Vector3<f64>)>,
         inertia: bool,
         sensor: Vector3<f64>,
-        frame: &TaskFrame,
         gravity: &Vector3<f64>,
         tare_until: Option<Ns>,
     ) -> ToolCompensation {
@@ -64,7 +63,7 @@ impl ToolCompensation {
             com,
             inertia,
             sensor,
-            gravity: frame.vector(gravity),
+            gravity: *gravity,
             tare: Tare { until: tare_until, sum: Spatial::zeros(), n: 0, offset: Spatial::zeros() },
             last_twist: None,
         }
@@ -123,8 +122,9 @@ mod tests {
 
     const DT: f64 = 5e-3;
 
-    fn frame() -> TaskFrame {
-        TaskFrame::new(&Pose { p: Vector3::new(0.6, 0.0, 0.9), r: rotation::from_rpy(std::f64::consts::PI, 0.0, 0.0) })
+    /// Base axes to those of C, which looks down.
+    fn to_c() -> Matrix3<f64> {
+        rotation::from_rpy(std::f64::consts::PI, 0.0, 0.0).transpose()
     }
 
     fn compensation(inertia: bool, tare_until: Option<Ns>) -> ToolCompensation {
@@ -132,8 +132,7 @@ mod tests {
             Some((0.8, Vector3::new(0.01, -0.02, 0.05))),
             inertia,
             Vector3::new(0.0, 0.0, -0.1),
-            &frame(),
-            &Vector3::new(0.0, 0.0, -9.81),
+            &(to_c() * Vector3::new(0.0, 0.0, -9.81)),
             tare_until,
         )
     }
@@ -152,7 +151,7 @@ mod tests {
     }
 
     fn pose_in_c(r: &Matrix3<f64>) -> Pose {
-        frame().pose(&Pose { p: Vector3::zeros(), r: *r })
+        Pose { p: Vector3::zeros(), r: to_c() * r }
     }
 
     #[test]
@@ -186,14 +185,15 @@ mod tests {
         let (w, dw) = (Vector3::new(0.0, 0.0, 1.0), Vector3::new(0.0, 0.0, 2.0));
         let a = Vector3::new(0.0, 3.0, 0.0) + dw.cross(&c) + w.cross(&w.cross(&c));
         let measured = gauges(&r, a, Vector3::zeros(), Vector3::zeros());
-        let twist = |t: f64| frame().spatial(&Spatial::new(0.0, 3.0 * t, 0.0, 0.0, 0.0, 2.0 * t));
+        let twist =
+            |t: f64| spatial(to_c() * Vector3::new(0.0, 3.0 * t, 0.0), to_c() * Vector3::new(0.0, 0.0, 2.0 * t));
         let x = pose_in_c(&r);
         let mut with = compensation(true, None);
         with.contact(&measured, &x, &twist(0.5 - DT), 0, DT);
         let fe = with.contact(&measured, &x, &twist(0.5), 0, DT).fe;
         assert!(fe.amax() < 1e-9, "{fe}");
         let without = compensation(false, None).contact(&measured, &x, &twist(0.5), 0, DT).fe;
-        assert!((without[1] + 0.8 * frame().vector(&(-a))[1]).abs() < 1e-9);
+        assert!((without[1] + 0.8 * (to_c() * -a)[1]).abs() < 1e-9);
     }
 
     #[test]

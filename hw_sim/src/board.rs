@@ -133,7 +133,7 @@ impl HwSim {
         if self.actuation != before {
             for i in 0..DOF {
                 // an engaging brake starts without deflection
-                if before.braked & !self.actuation.braked & (1 << i) != 0 {
+                if self.actuation.braked & !before.braked & (1 << i) != 0 {
                     self.state.brake[i] = 0.0;
                 }
             }

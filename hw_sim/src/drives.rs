@@ -55,7 +55,7 @@ impl Drives {
     }
 
     /// Torques of the motors, Nm.
-    pub fn motor_torques(&self, actuation: &Actuation) -> JointVector {
+    pub(crate) fn motor_torques(&self, actuation: &Actuation) -> JointVector {
         let mut torques = JointVector::zeros();
         for (k, pair) in self.pairs.iter().enumerate() {
             store(&mut torques, k, pair.motor_torque(load(&actuation.volts, k)));
@@ -64,7 +64,7 @@ impl Drives {
     }
 
     /// Behind flexible joints: transmissions, friction and brakes of `state` under the motors' torques.
-    pub fn flexible(&self, state: &State, actuation: &Actuation, motor: &JointVector) -> Driving {
+    pub(crate) fn flexible(&self, state: &State, actuation: &Actuation, motor: &JointVector) -> Driving {
         let mut driving = Driving::default();
         let held = actuation.held();
         // the long series by themselves, so that the processor can work at several joints at once
@@ -85,7 +85,7 @@ impl Drives {
     }
 
     /// With rigid joints: friction and brakes of `state`, under the load of the step before.
-    pub fn rigid(&self, state: &State, actuation: &Actuation) -> Losses {
+    pub(crate) fn rigid(&self, state: &State, actuation: &Actuation) -> Losses {
         let mut losses = Losses::default();
         let held = actuation.held();
         for (k, pair) in self.pairs.iter().enumerate() {

@@ -28,7 +28,7 @@ pub(crate) fn crba_in(model: &ArmModel, screws: &Screws) -> JointMatrix {
 /// Rows of M from the diagonal on; what stands before the diagonal, or in the tip's lane, means nothing.
 #[inline(always)]
 pub(crate) fn mass_rows(screws: &Screws, links: &Bodies) -> [[Pair; PAIRS]; DOF] {
-    let composites = from_tip(*links);
+    let composites = from_tip(links);
     // momentum rates of the composites about the tip, each for its own joint's unit acceleration
     let rates: [Wrench<Pair>; PAIRS] = std::array::from_fn(|k| {
         let (s, z, body) = (screws[k].s, screws[k].r.z, &composites[k]);

@@ -45,21 +45,26 @@ pub(crate) type Frames = [Frame; DOF + 1];
 pub(crate) fn frames(model: &ArmModel, q: &JointVector) -> Frames {
     let chain = &model.chain;
     let q = pairs_of(q, 0.0);
-    let angles: [_; PAIRS] = std::array::from_fn(|k| sin_cos(q[k] + chain.offset[k]));
-    let mut z = Column::from(chain.base.z);
-    let (mut x, mut y): (Column, Column) = (chain.base.x.into(), chain.base.y.into());
+    let (mut sin, mut cos) = ([0.0; DOF + 1], [0.0; DOF + 1]);
+    for k in 0..PAIRS {
+        let (s, c) = sin_cos(q[k] + chain.offset[k]);
+        (sin[k], sin[k + PAIRS]) = (s.low(), s.high());
+        (cos[k], cos[k + PAIRS]) = (c.low(), c.high());
+    }
+    let base = &chain.base;
+    let (mut x, mut y, mut z): (Column, Column, Column) = (base.x.into(), base.y.into(), base.z.into());
     let mut o = Column::from(chain.p[0]);
-    std::array::from_fn(|i| {
-        if i > 0 {
-            o = o.displaced(&[x, y, z], chain.p[i]);
-            let (c, s) = chain.twist[i];
+    let mut frames = [Frame { r: [x, y, z], o }; DOF + 1];
+    for i in 0..=DOF {
+        (x, y) = (x.combined(cos[i], y, sin[i]), y.combined(cos[i], x, -sin[i]));
+        frames[i] = Frame { r: [x, y, z], o };
+        if i < DOF {
+            o = o.displaced(&[x, y, z], chain.p[i + 1]);
+            let (c, s) = chain.twist[i + 1];
             (y, z) = (y.combined(c, z, s), z.combined(c, y, -s));
         }
-        let (s, c) = angles[i % PAIRS];
-        let (s, c) = (s.to_array()[i / PAIRS], c.to_array()[i / PAIRS]);
-        (x, y) = (x.combined(c, y, s), y.combined(c, x, -s));
-        Frame { r: [x, y, z], o }
-    })
+    }
+    frames
 }
 
 impl Frame {
@@ -129,10 +134,10 @@ impl Motion {
         let qd = pairs_of(qd, 0.0);
         let s: [V3<Pair>; PAIRS] = std::array::from_fn(|k| screws[k].s * qd[k]);
         let z: [V3<Pair>; PAIRS] = std::array::from_fn(|k| screws[k].r.z * qd[k]);
-        let w = from_base(z);
+        let w = from_base(&z);
         // half of Coriolis' 2 ω × s q̇ is felt before the joint, half behind it
-        let a = from_base(std::array::from_fn(|k| (w[k] + (w[k] - z[k])).cross(s[k])));
-        let dw = from_base(std::array::from_fn(|k| w[k].cross(z[k])));
+        let a = from_base(&std::array::from_fn(|k| (w[k] + (w[k] - z[k])).cross(s[k])));
+        let dw = from_base(&std::array::from_fn(|k| w[k].cross(z[k])));
         Motion { w, a, dw, v: total(&s) }
     }
 

@@ -196,7 +196,7 @@ pub(crate) fn lane<T: Lanes>(pairs: &[T; PAIRS], i: usize) -> T::One {
 
 /// Every joint's sum from joint 1 up to and with its own; the tip's is all.
 #[inline(always)]
-pub(crate) fn from_base<T: Lanes>([a, b, c, d]: [T; PAIRS]) -> [T; PAIRS]
+pub(crate) fn from_base<T: Lanes>(&[a, b, c, d]: &[T; PAIRS]) -> [T; PAIRS]
 where
     T::One: Default,
 {
@@ -216,7 +216,7 @@ pub(crate) fn total(x: &[V3<Pair>; PAIRS]) -> V3 {
 
 /// Every joint's sum from the tip down to and with its own.
 #[inline(always)]
-pub(crate) fn from_tip<T: Lanes>([a, b, c, d]: [T; PAIRS]) -> [T; PAIRS]
+pub(crate) fn from_tip<T: Lanes>(&[a, b, c, d]: &[T; PAIRS]) -> [T; PAIRS]
 where
     T::One: Default,
 {
@@ -235,7 +235,7 @@ mod tests {
     fn sums_run_over_the_joints_in_order() {
         let ones: [f64; 8] = std::array::from_fn(|i| (1 << i) as f64);
         let pairs: [Pair; PAIRS] = paired(&ones);
-        let (up, down) = (from_base(pairs), from_tip(pairs));
+        let (up, down) = (from_base(&pairs), from_tip(&pairs));
         for i in 0..8 {
             assert_eq!(lane(&pairs, i), ones[i]);
             assert_eq!(lane(&up, i), ones[..=i].iter().sum::<f64>());

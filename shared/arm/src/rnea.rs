@@ -52,7 +52,7 @@ pub(crate) fn carried(model: &ArmModel, motion: &Motion, bodies: &Bodies, f_tip:
     let at_tip = |k: usize| V3::pair(V3::ZERO, v3(-f_tip[k], -f_tip[k + 1], -f_tip[k + 2]));
     wrenches[PAIRS - 1].f += at_tip(0);
     wrenches[PAIRS - 1].n += at_tip(3);
-    from_tip(wrenches)
+    from_tip(&wrenches)
 }
 
 /// Component of a wrench along a joint: its torque.
@@ -66,8 +66,8 @@ impl Motion {
     #[inline(always)]
     pub fn accelerated(&self, screws: &Screws, qdd: &JointVector) -> Motion {
         let qdd = pairs_of(qdd, 0.0);
-        let a = from_base(std::array::from_fn(|k| screws[k].s * qdd[k]));
-        let dw = from_base(std::array::from_fn(|k| screws[k].r.z * qdd[k]));
+        let a = from_base(&std::array::from_fn(|k| screws[k].s * qdd[k]));
+        let dw = from_base(&std::array::from_fn(|k| screws[k].r.z * qdd[k]));
         Motion {
             a: std::array::from_fn(|k| self.a[k] + a[k]),
             dw: std::array::from_fn(|k| self.dw[k] + dw[k]),

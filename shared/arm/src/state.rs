@@ -113,7 +113,7 @@ impl<'m> ArmState<'m> {
         match &self.model.slide {
             Some(slide) => slide.potential_energy(self.model.gravity, &self.q),
             None => {
-                let all = lane(&from_tip(bodies(self.model, &self.screws)), 0);
+                let all = lane(&from_tip(&bodies(self.model, &self.screws)), 0);
                 -self.model.gravity.dot(all.first + self.model.chain.fixed)
             }
         }

@@ -84,6 +84,24 @@ impl Running {
         }
     }
 
+    /// Waits until windows have passed, as whoever watches a run does: it is asked to show itself.
+    pub fn wait_until_it_runs(&mut self) {
+        loop {
+            self.pause(POLL);
+            for base in machine::entries(&self.temporary).iter().filter(|name| name.starts_with("vmerack-")) {
+                for run in machine::entries(&self.temporary.join(base)) {
+                    let folder = self.temporary.join(base).join(run);
+                    // it may end at any moment
+                    let _ = std::fs::write(folder.join("watched"), "");
+                    if folder.join("status.json").exists() {
+                        return;
+                    }
+                }
+            }
+            assert!(self.started.elapsed() < WATCHDOG, "no window after 60 s");
+        }
+    }
+
     /// Lets the run go on for so long; fails where it ends by itself.
     pub fn pause(&mut self, time: Duration) {
         let until = Instant::now() + time;

@@ -18,4 +18,5 @@ pub mod commands;
 mod machine;
 pub mod parallel;
 pub mod rack_run;
+mod settled_record;
 mod status;

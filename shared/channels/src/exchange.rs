@@ -56,6 +56,8 @@ trait Inlet {
         inboxes: &mut Inboxes,
         arrived: &mut dyn FnMut(&Header),
     ) -> Result<(), ChannelError>;
+    /// Throws away what is there, and takes the next message whatever its number.
+    fn renew(&mut self) -> Result<(), ChannelError>;
     /// Takes up to so many sealed messages as they are.
     fn receive_sealed(
         &mut self,
@@ -223,6 +225,11 @@ impl<T: Payload> Inlet for TypedInlet<T> {
         }
     }
 
+    fn renew(&mut self) -> Result<(), ChannelError> {
+        self.expected = None;
+        self.port.receive_up_to(u32::MAX, |_, _| {})
+    }
+
     fn receive_sealed(
         &mut self,
         messages: u32,
@@ -368,9 +375,19 @@ impl Exchange {
         }
     }
 
-    /// That board starts again: what was on its way to it is lost.
-    pub fn renew(&mut self, board: BoardId) {
+    /// That board starts again: what was on its way to it is lost, unless a board beside it that is not down waits for it too.
+    pub fn renew(&mut self, board: BoardId) -> Result<(), ChannelError> {
         self.tampered.iter_mut().for_each(|tampered| tampered.renew(board));
+        let Some(tally) = &self.tally else { return Ok(()) };
+        let down = tally.word(DOWN_WORD).load(Ordering::SeqCst);
+        let is_down = |reader: &BoardId| down >> *reader as u32 & 1 == 1;
+        for ((route, inlet), seen) in self.inlets.iter_mut().zip(&mut self.seen) {
+            if inlet.readers().contains(&board) && inlet.readers().iter().all(is_down) {
+                *seen = tally.word(*route).load(Ordering::SeqCst);
+                inlet.renew()?;
+            }
+        }
+        Ok(())
     }
 
     /// From now on messages say when they were sent on the wall clock, and arrivals are measured.

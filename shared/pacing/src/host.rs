@@ -82,12 +82,17 @@ impl Host {
     pub(crate) fn build(&mut self, up: &[BoardId], context: &Context, factory: Factory<'_>) -> Result<(), RunError> {
         for id in up {
             let board = factory(*id, context).map_err(|reason| RunError::Board { board: id.name(), reason })?;
-            self.inboxes[*id as usize].clear();
-            self.exchange.renew(*id);
-            self.windows[*id as usize] = (0, 0);
+            self.renew(*id)?;
             self.boards.push((*id, board));
         }
         Ok(())
+    }
+
+    /// Forgets the mail that has come for a board that starts again.
+    pub(crate) fn renew(&mut self, board: BoardId) -> Result<(), RunError> {
+        self.inboxes[board as usize].clear();
+        self.windows[board as usize] = (0, 0);
+        Ok(self.exchange.renew(board)?)
     }
 
     /// Takes in the mail of the board that the grant names and steps it.

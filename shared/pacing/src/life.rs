@@ -1,6 +1,6 @@
 //! Boards that go down and come up again: planned crashes and hangs, and processes that die although nobody planned it.
 //!
-//! A planned outage begins and ends between two windows: its boards are idle, and the timing plane knows of it. Where they
+//! In lock step a planned outage begins and ends between two windows: its boards are idle, and the timing plane knows of it. Where they
 //! live in a process of their own, that gets the real signal, which is confirmed before simulated time goes on; in the
 //! chassis the boards are dropped as a killed process drops them, with nothing flushed. They come up as new ones.
 //!
@@ -17,12 +17,20 @@ use scenario::{Outage, Restart, Scenario};
 use std::collections::VecDeque;
 use vme::Timing;
 
+/// Boards that come up again together.
+pub(crate) struct Return {
+    /// When, at the earliest.
+    pub at: Ns,
+    pub boards: Vec<BoardId>,
+    /// Their outage was planned.
+    pub planned: bool,
+}
+
 /// What is down, and what goes down or comes up when.
 pub(crate) struct Life {
     /// Planned outages to come, in the order of time.
     outages: VecDeque<Outage>,
-    /// Boards that come up again, when, and whether their outage was planned.
-    returns: Vec<(Ns, Vec<BoardId>, bool)>,
+    pub returns: Vec<Return>,
     /// A bit for each board that is down.
     down: u32,
     /// Processes that have died unplanned since the last window, and how.
@@ -71,10 +79,14 @@ impl Life {
         !self.died.is_empty()
     }
 
+    /// When the next planned outage begins.
+    pub fn next_outage(&self) -> Ns {
+        self.outages.front().map_or(Ns::MAX, |outage| outage.from)
+    }
+
     /// When a window has to end because boards go down or come up.
     pub fn next_change(&self) -> Ns {
-        let returns = self.returns.iter().map(|(at, ..)| *at).min().unwrap_or(Ns::MAX);
-        self.outages.front().map_or(Ns::MAX, |outage| outage.from).min(returns)
+        self.returns.iter().map(|again| again.at).min().unwrap_or(Ns::MAX).min(self.next_outage())
     }
 }
 
@@ -105,45 +117,40 @@ impl Boards<'_> {
         true
     }
 
-    /// In real time nobody waits for a new process: the run goes on without those that have died. True where there are any.
-    pub fn go_on_without(&mut self) -> bool {
-        let died = std::mem::take(&mut self.life.died);
-        for (process, how) in &died {
-            let when = at(self.reached);
-            self.life.losses.push(format!("process `{process}` {how}, {when}; the run went on without it"));
-            let stated = self.context.scenario.processes.iter().filter(|stated| stated.name == *process);
-            self.life.tell_lost(self.reached, stated.flat_map(scenario::Process::board_ids));
-        }
-        !died.is_empty()
-    }
-
     /// Carries out what is due at `now`, between two windows. `rest` holds the rest of each task's jobs.
     pub fn change_lives(&mut self, now: Ns, timing: &mut Timing, rest: &mut [Vec<Op>]) -> Result<(), RunError> {
-        for (process, how) in std::mem::take(&mut self.life.died) {
-            self.lost(now, &process, &how, timing);
+        for boards in self.lost(now) {
+            self.tasks_of(&boards).into_iter().for_each(|task| timing.halt(task));
         }
-        while let Some(i) = self.life.returns.iter().position(|(at, ..)| *at <= now) {
-            let (_, boards, planned) = self.life.returns.remove(i);
+        while let Some(i) = self.life.returns.iter().position(|again| again.at <= now) {
+            let Return { boards, planned, .. } = self.life.returns.remove(i);
             self.come_up(now, &boards, timing, rest)?;
             if !planned {
                 self.tasks_of(&boards).into_iter().for_each(|task| timing.restart(task));
             }
         }
-        while self.life.outages.front().is_some_and(|outage| outage.from <= now) {
-            if let Some(outage) = self.life.outages.pop_front() {
-                self.go_down(now, &outage)?;
+        while let Some(outage) = self.outage_due(now) {
+            if outage.boards.contains(&BoardId::BusAnalyzer) {
+                self.settle_recorder()?;
             }
+            self.go_down(now, &outage)?;
         }
         Ok(())
     }
 
-    fn go_down(&mut self, now: Ns, outage: &Outage) -> Result<(), RunError> {
-        if outage.boards.iter().any(|board| self.life.is_down(*board)) {
-            return Ok(());
+    /// The next planned outage that begins by `now`, of boards that are not down already.
+    pub fn outage_due(&mut self, now: Ns) -> Option<Outage> {
+        while self.life.outages.front().is_some_and(|outage| outage.from <= now) {
+            let outage = self.life.outages.pop_front()?;
+            if !outage.boards.iter().any(|board| self.life.is_down(*board)) {
+                return Some(outage);
+            }
         }
-        if outage.boards.contains(&BoardId::BusAnalyzer) {
-            self.settle_recorder()?;
-        }
+        None
+    }
+
+    /// Takes the boards of an outage down at `now`.
+    pub fn go_down(&mut self, now: Ns, outage: &Outage) -> Result<(), RunError> {
         match self.place[outage.boards[0] as usize] {
             Some(remote) => {
                 let process = self.remotes[remote].process.clone();
@@ -164,21 +171,35 @@ impl Boards<'_> {
         let event = Event::injected(now, outage.fault);
         self.life.mail.events.push(event);
         if outage.until != Ns::MAX {
-            self.life.returns.push((outage.until, outage.boards.clone(), true));
+            self.life.returns.push(Return { at: outage.until, boards: outage.boards.clone(), planned: true });
         }
         Ok(())
     }
 
-    /// The boards of a process that died unplanned are down from `now` on.
-    fn lost(&mut self, now: Ns, process: &str, how: &str, timing: &mut Timing) {
-        let Some(stated) = self.context.scenario.processes.iter().find(|stated| stated.name == process) else { return };
-        let boards: Vec<BoardId> = stated.board_ids().collect();
-        let up = now + scenario::nanoseconds(stated.boot_ms * 1e-3);
-        self.life.losses.push(format!("process `{process}` {how}, {}; it is started again", at(now)));
-        self.life.restarted.push(process.to_owned());
-        self.tasks_of(&boards).into_iter().for_each(|task| timing.halt(task));
-        self.life.tell_lost(now, boards.iter().copied());
-        self.life.returns.push((up, boards, false));
+    /// The boards of each process that has died unplanned since the last call: they are down from `now` on, and come up again.
+    pub fn lost(&mut self, now: Ns) -> Vec<Vec<BoardId>> {
+        let mut lost = Vec::new();
+        for (process, how) in std::mem::take(&mut self.life.died) {
+            let boards = self.context.scenario.processes.iter().find(|stated| stated.name == process);
+            let boards: Vec<BoardId> = boards.into_iter().flat_map(scenario::Process::board_ids).collect();
+            self.life.losses.push(format!("process `{process}` {how}, {}; it is started again", at(now)));
+            self.life.restarted.push(process);
+            self.life.tell_lost(now, boards.iter().copied());
+            self.life.returns.push(Return {
+                at: now + self.boot_time(&boards),
+                boards: boards.clone(),
+                planned: false,
+            });
+            lost.push(boards);
+        }
+        lost
+    }
+
+    /// Time that the process of these boards takes to boot.
+    pub fn boot_time(&self, boards: &[BoardId]) -> Ns {
+        let processes = &self.context.scenario.processes;
+        let process = processes.iter().find(|process| process.board_ids().any(|board| boards.contains(&board)));
+        process.map_or(0, |process| scenario::nanoseconds(process.boot_ms * 1e-3))
     }
 
     fn come_up(
@@ -188,16 +209,11 @@ impl Boards<'_> {
         timing: &mut Timing,
         rest: &mut [Vec<Op>],
     ) -> Result<(), RunError> {
-        if boards.contains(&BoardId::BusAnalyzer) {
-            self.parts += 1;
-            self.context.record = self.first_record.as_ref().map(|record| crate::part_of(record, self.parts));
+        self.start_again(boards)?;
+        if let Some(remote) = self.place[boards[0] as usize] {
+            self.wait_until_ready(remote)?;
         }
-        match self.place[boards[0] as usize] {
-            Some(remote) => self.start_again(remote, boards)?,
-            None => self.host.build(boards, &self.context, self.factory)?,
-        }
-        self.life.down &= !mask(boards);
-        self.show_down();
+        self.mark_up(now, boards);
         for task in self.tasks_of(boards) {
             rest[usize::from(task)].clear();
         }
@@ -208,27 +224,41 @@ impl Boards<'_> {
                 self.note_program(timing.rack(), *board, task, &program)?;
                 timing.set_program(task, &program);
             }
-            let event = Event::new(now, EventKind::BoardUp, Severity::Ok, f64::from(*board as u8), 0.0);
-            self.life.mail.events.push(event);
         }
         Ok(())
     }
 
-    fn start_again(&mut self, remote: usize, boards: &[BoardId]) -> Result<(), RunError> {
+    /// Builds boards that are down anew, or starts a process that does.
+    pub fn start_again(&mut self, boards: &[BoardId]) -> Result<(), RunError> {
+        if boards.contains(&BoardId::BusAnalyzer) {
+            self.parts += 1;
+            self.context.record = self.first_record.as_ref().map(|record| crate::part_of(record, self.parts));
+        }
+        let Some(remote) = self.place[boards[0] as usize] else {
+            return self.host.build(boards, &self.context, self.factory);
+        };
         let process = self.remotes[remote].process.clone();
         // one that hangs is powered off first
         self.power.remove(&process);
         if let Some(domain) = &self.domain {
             domain.clean_dead(mask(boards));
         }
-        while self.remotes[remote].reply(self.reached)?.is_some() {}
+        self.remotes[remote].renew(self.reached)?;
         let Some(folder) = &self.folder else { return Ok(()) };
         folder.write_context(&self.context)?;
         let pid = self.power.spawn(&process, &self.commands[remote], &folder.path)?;
         if let Some(processor) = &self.processor_kept {
             processor.keep(pid, boards.contains(&BoardId::BusAnalyzer));
         }
-        self.wait_until_ready(remote)
+        Ok(())
+    }
+
+    /// Boards are up again at `now`.
+    pub fn mark_up(&mut self, now: Ns, boards: &[BoardId]) {
+        self.life.down &= !mask(boards);
+        self.show_down();
+        let up = |board: &BoardId| Event::new(now, EventKind::BoardUp, Severity::Ok, f64::from(*board as u8), 0.0);
+        self.life.mail.events.extend(boards.iter().map(up));
     }
 
     fn mark_down(&mut self, boards: &[BoardId]) {
@@ -245,7 +275,7 @@ impl Boards<'_> {
         }
     }
 
-    fn tasks_of(&self, boards: &[BoardId]) -> Vec<u16> {
+    pub fn tasks_of(&self, boards: &[BoardId]) -> Vec<u16> {
         (0..).zip(&self.of_task).filter(|(_, board)| boards.contains(board)).map(|(task, _)| task).collect()
     }
 }

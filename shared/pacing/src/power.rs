@@ -63,7 +63,7 @@ impl Power {
         let pid = self.pid(name).ok_or("it had ended before")?;
         kill_process(pid, Signal::STOP).map_err(|error| error.to_string())?;
         let deadline = Instant::now() + LEAVE;
-        while !matches!(self.activity(name), Some(('T', _))) {
+        while !self.is_stopped(name) {
             if Instant::now() > deadline {
                 return Err("it goes on".into());
             }
@@ -108,6 +108,11 @@ impl Power {
             _ if used == before => Some("alive, but it uses no processor time"),
             _ => None,
         }
+    }
+
+    /// Whether the process is in state T.
+    pub fn is_stopped(&self, name: &str) -> bool {
+        matches!(self.activity(name), Some(('T' | 't', _)))
     }
 
     /// Processor time used by the process so far, clock ticks.

@@ -6,6 +6,7 @@
 //! [`LEAD`] stages before it is due, then with what its tasks did last. A process that ends or stalls is a [`RunError`]
 //! within a bounded wall time.
 
+mod lives;
 mod paced;
 mod plan;
 mod rights;
@@ -21,6 +22,7 @@ use crate::{Context, Flow, Observer, RunError};
 use board::{BoardId, Mail, Ns};
 use channels::{sleep_until, wall_ns};
 use messages::{BOARDS, Event, EventKind, Grant, Severity, Span, TransferRecord, flags};
+use lives::Booting;
 use paced::{stage, stage_ns};
 use plan::{Draft, Plan};
 use std::collections::VecDeque;
@@ -34,6 +36,8 @@ const LEAD: u64 = 4;
 const HORIZON: Ns = 10 * MILLISECOND;
 /// Unanswered windows of a process after which no more are told until it catches up.
 const CREDIT: u32 = 64;
+/// No answer for this long in state T: stopped for good. Nobody may wait longer: channels to it would fill up.
+const STOPPED: Duration = Duration::from_millis(100);
 /// Wall time between the last preparation and simulated time 0.
 const START_UP: u64 = 300 * MILLISECOND;
 
@@ -55,6 +59,8 @@ pub struct Realtime<'f> {
     stage_ns: Ns,
     /// Windows told that have not been shown to the observer.
     told: VecDeque<(u64, Draft)>,
+    /// Processes that have been started again and do not take part yet.
+    booting: Vec<Booting>,
     debts: Vec<Debt>,
     watched: Instant,
     own_mail: Mail,
@@ -109,6 +115,7 @@ impl<'f> Realtime<'f> {
             boards,
             zero,
             told: VecDeque::new(),
+            booting: Vec::new(),
             debts,
             watched: Instant::now(),
             own_mail: Mail::default(),
@@ -154,7 +161,7 @@ impl<'f> Realtime<'f> {
     pub fn run(&mut self, end: Ns, observer: &mut dyn Observer) -> Result<(), RunError> {
         let mut draft: Option<Draft> = None;
         while self.boards.reached < end {
-            if self.take_answers()? {
+            if self.change_lives()? | self.take_answers()? {
                 draft = None;
             }
             while self.local.due().is_some_and(|due| due <= wall_ns()) {
@@ -166,6 +173,7 @@ impl<'f> Realtime<'f> {
             self.watch()?;
             let clock = wall_ns().saturating_sub(self.zero);
             let mut next = self.local.due().unwrap_or(u64::MAX);
+            next = next.min(self.next_change().saturating_add(self.zero));
             next = next.min(self.told.front().map_or(u64::MAX, |(_, draft)| self.closing(draft.until)));
             if self.plan.told_to() < end && self.debts.iter().all(|debt| debt.grants < CREDIT) {
                 let from = self.plan.told_to();
@@ -277,6 +285,7 @@ impl<'f> Realtime<'f> {
         let mut any = false;
         for remote in 0..self.boards.remotes.len() {
             while let Some((board, window, answer)) = self.boards.remotes[remote].reply(self.boards.reached)? {
+                any |= self.boots(remote, window);
                 let grants = self.debts[remote].grants.saturating_sub(1);
                 self.debts[remote] = Debt { grants, since: Instant::now(), used: None };
                 any |= self.answered(board, window, answer)?;
@@ -319,6 +328,7 @@ impl<'f> Realtime<'f> {
             self.own_mail.events.append(&mut self.boards.life.mail.events);
             self.boards.injections.tell(until, &mut self.own_mail.events);
             self.own_mail.transfers.extend(recorded_transfers(&log).map(TransferRecord::from));
+            self.boards.life.lines.transfers(&self.own_mail.transfers);
             self.own_mail.events.extend(trips.iter().map(|(at, task, job)| {
                 let (job, task) = ((*job).into(), (*task).into());
                 Event::new(*at, EventKind::OverrunTrip, Severity::Error, job, task)
@@ -330,6 +340,9 @@ impl<'f> Realtime<'f> {
             self.grant(&grant)?;
             let mail = self.boards.host.fetch(BoardId::Chassis, until, self.boards.reached)?;
             self.boards.reached = until;
+            if let Some(probe) = mail.plant_probe.last() {
+                self.boards.life.lines.probe(probe);
+            }
             let flow = observer.window(until, mail, &log);
             mail.clear();
             self.boards.show_spans(observer)?;
@@ -350,6 +363,9 @@ impl<'f> Realtime<'f> {
         let Boards { power, remotes, .. } = &self.boards;
         for (debt, remote) in self.debts.iter_mut().zip(remotes).filter(|(debt, _)| debt.grants > 0) {
             let used = *debt.used.get_or_insert_with(|| power.used(&remote.process));
+            if debt.since.elapsed() > STOPPED && power.is_stopped(&remote.process) {
+                stalled = Some((remote.process.clone(), "stopped by a signal", debt.since.elapsed().as_secs_f64()));
+            }
             if debt.since.elapsed() > STALL {
                 if let Some(how) = power.idle(&remote.process, used) {
                     stalled = Some((remote.process.clone(), how, debt.since.elapsed().as_secs_f64()));
@@ -362,13 +378,6 @@ impl<'f> Realtime<'f> {
             && !self.boards.outlives(&process, &format!("was stalled ({how})"))
         {
             return Err(RunError::Stalled { process, how: how.into(), waited_s, when: at(self.boards.reached) });
-        }
-        if self.boards.go_on_without() {
-            for board in BOARDS.iter().filter(|board| self.boards.life.is_down(**board)) {
-                if let Some(remote) = self.boards.place[*board as usize] {
-                    self.debts[remote].grants = 0;
-                }
-            }
         }
         Ok(())
     }

@@ -55,6 +55,16 @@ impl Remote {
         })
     }
 
+    /// Another process takes the place of the one that was there: what that one has said last is void.
+    pub fn renew(&mut self, now: Ns) -> Result<(), RunError> {
+        while self.reply(now)?.is_some() {}
+        if let Some((port, next)) = &mut self.measured {
+            while port.receive(|_, _| {})? {}
+            *next = 0;
+        }
+        Ok(())
+    }
+
     /// Takes what the process has measured; returns the number of messages that were lost.
     pub fn spans(&mut self, into: &mut Vec<Span>) -> Result<u32, ChannelError> {
         let Some((port, next)) = &mut self.measured else { return Ok(0) };

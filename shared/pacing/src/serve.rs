@@ -112,6 +112,10 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
                 paced.push(grant, &transfers);
                 continue;
             }
+            if grant.flags & flags::BOOT != 0 && grant.until > 0 {
+                // what came while this process started up was for one that is no more
+                host.renew(BOARDS[grant.board as usize % BOARDS.len()])?;
+            }
             let answer = host.step(&grant, &transfers)?;
             host.take_spans([], &mut spans);
             line.tell(&mut spans, true);

@@ -3,6 +3,7 @@
 //! A fault's time runs from its injection to the next one's, or to the end of the run.
 
 use crate::trace::{Trace, seconds};
+use messages::drive_status::BRAKE_ENGAGED;
 use messages::{Detector, Event, EventKind};
 use scenario::Scenario;
 use serde::Serialize;
@@ -29,6 +30,8 @@ pub struct FaultRow {
     pub detected_by: Option<String>,
     /// From its begin until the control computer began to stop the arm, s.
     pub stopping_after_s: Option<f64>,
+    /// From its begin until the brakes of all joints had fallen in for the rest of its time, s; none = they had not.
+    pub braked_after_s: Option<f64>,
     /// Gravest state of the control computer.
     pub reaction: String,
     /// Greatest contact force, N.
@@ -78,6 +81,11 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
     let torque = |probe: &messages::PlantProbe| {
         (0..messages::JOINTS).map(|i| probe.motor_torque[i].abs() / limits[i]).fold(0.0f64, f64::max)
     };
+    let is_braked = |probe: &messages::PlantProbe| probe.status & BRAKE_ENGAGED == BRAKE_ENGAGED;
+    let mut braked = None;
+    for probe in probes.clone() {
+        braked = if is_braked(probe) { braked.or(Some(probe.t)) } else { None };
+    }
     let (mut peak_force_n, mut peak_torque_share, mut distance_m) = (0.0f64, 0.0f64, 0.0f64);
     for probe in probes {
         peak_force_n = peak_force_n.max(force(probe));
@@ -92,6 +100,7 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
         detected_after_s: first.map(after),
         detected_by: first.and_then(detector),
         stopping_after_s: stopping.map(after),
+        braked_after_s: braked.map(|t| seconds(t) - seconds(from)),
         reaction: STATES.get(gravest.unwrap_or(0)).copied().unwrap_or("unknown").into(),
         peak_force_n,
         force_before_n: force(before),
@@ -120,8 +129,8 @@ fn detector(event: &Event) -> Option<String> {
 }
 
 /// Headings of the fault table.
-pub(crate) const HEADINGS: [&str; 9] =
-    ["fault", "at s", "detected by", "after ms", "stopping after ms", "reaction", "force before, peak N", "peak torque %", "moved mm"];
+pub(crate) const HEADINGS: [&str; 10] =
+    ["fault", "at s", "detected by", "after ms", "stopping after ms", "braked after ms", "reaction", "force before, peak N", "peak torque %", "moved mm"];
 
 /// Cells of the fault table.
 pub(crate) fn cells(rows: &[FaultRow]) -> Vec<Vec<String>> {
@@ -133,6 +142,7 @@ pub(crate) fn cells(rows: &[FaultRow]) -> Vec<Vec<String>> {
             row.detected_by.clone().unwrap_or("undetected".into()),
             ms(row.detected_after_s),
             ms(row.stopping_after_s),
+            ms(row.braked_after_s),
             row.reaction.clone(),
             format!("{:.1}, {:.1}", row.force_before_n, row.peak_force_n),
             format!("{:.0}", 1e2 * row.peak_torque_share),

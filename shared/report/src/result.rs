@@ -57,6 +57,8 @@ pub struct VariantResult {
     pub record: Option<String>,
     /// Digest, where it was computed.
     pub digest: Option<String>,
+    /// What the record lacks: a recorder that was down, or could not write, from and to, s.
+    pub unrecorded: Vec<(f64, f64)>,
     #[serde(skip)]
     pub(crate) curves: Curves,
 }
@@ -181,6 +183,7 @@ impl VariantResult {
             measured: Vec::new(),
             record: None,
             digest: None,
+            unrecorded: Vec::new(),
             curves: Curves {
                 force,
                 position: std::array::from_fn(|k| plant(&|probe| probe.position[k])),
@@ -196,6 +199,12 @@ impl VariantResult {
                 way: way(scenario, trace)?,
             },
         })
+    }
+
+    /// The record lacks what happened from one instant to the other, s.
+    pub fn lacks(&mut self, from_s: f64, to_s: f64) {
+        self.unrecorded.push((from_s, to_s));
+        self.findings.push(format!("nothing is recorded from {from_s:.3} to {to_s:.3} s"));
     }
 }
 

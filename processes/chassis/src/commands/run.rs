@@ -1,9 +1,10 @@
 //! `vmerack run`: runs every variant of a scenario, prints the tables, writes records and report.
 //!
-//! Exit code 0 where every limit holds, 1 where a run could not be carried out, 3 where a record is incomplete, 4 where a
-//! limit is violated.
+//! Exit code 0 where every limit holds, 1 where a run could not be carried out, 3 where a process was lost on the way or a
+//! record is incomplete, 4 where a limit is violated.
 
 use crate::parallel::parallel;
+use crate::settled_record;
 use crate::rack_run::{self, Finished, INTERRUPTED, Pacing, Setting};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -65,9 +66,6 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
     let mut variants = chosen(&document, &args.variant)?;
     for (_, scenario) in &mut variants {
         args.restart.iter().try_for_each(|policy| set_restart(scenario, policy))?;
-        if args.pacing == Pacing::Realtime && !scenario.outages().is_empty() {
-            return Err(refused("--pacing", "realtime", "crashes and hangs are planned, expected lock step").into());
-        }
     }
     end_on_signals()?;
     for (variant, scenario) in &variants {
@@ -87,7 +85,7 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
         let record = (!args.no_record).then(|| folder.join(format!("{}.mcap", variant.name)));
         if let Some(record) = &record {
             // of a run before in the same folder
-            parts(record).skip(1).try_for_each(std::fs::remove_file).into_diagnostic()?;
+            settled_record::parts(record).skip(1).try_for_each(std::fs::remove_file).into_diagnostic()?;
         }
         let setting = Setting { pacing: args.pacing, in_process: args.in_process, record: record.clone(), measure: false };
         let finished = run_with_progress(scenario, variant, &setting)?;
@@ -101,6 +99,7 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
         }
         for loss in &finished.losses {
             eprintln!("warning: variant {}: {loss}", variant.name);
+            result.findings.push(loss.clone());
         }
         losses |= !finished.losses.is_empty();
         // a run that ends before it begins has none
@@ -108,14 +107,18 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
             let is_recorder_down = |outage: &scenario::Outage| outage.boards.contains(&BoardId::BusAnalyzer);
             let broken =
                 failed || !finished.losses.is_empty() || scenario.outages().iter().any(is_recorder_down);
-            for (part, file) in parts(record).enumerate() {
-                match settle_record(&file, broken) {
-                    Ok(digest) if part == 0 => result.digest = Some(digest),
-                    Ok(_) => eprintln!("the record goes on in {}", file.display()),
-                    Err(reason) => {
-                        eprintln!("error: {}: {reason}", file.display());
+            match settled_record::settle(record, broken, result.simulated_s) {
+                Ok(settled) => {
+                    result.digest = Some(settled.digest);
+                    for (from_s, to_s) in settled.unrecorded {
+                        eprintln!("warning: variant {}: nothing is recorded from {from_s:.3} to {to_s:.3} s", variant.name);
+                        result.lacks(from_s, to_s);
                         losses = true;
                     }
+                }
+                Err(reason) => {
+                    eprintln!("error: {reason}");
+                    losses = true;
                 }
             }
             result.record = record.file_name().map(|name| name.to_string_lossy().into_owned());
@@ -214,16 +217,6 @@ fn run_with_progress(scenario: &Scenario, variant: &Variant, setting: &Setting) 
     finished.map_err(|reason| miette!("variant {}: {reason}", variant.name))
 }
 
-/// The files of a record: one, and another for each time that the recorder was started again.
-fn parts(record: &Path) -> impl Iterator<Item = PathBuf> {
-    let first = record.to_path_buf();
-    let more = (2..).map({
-        let record = record.to_path_buf();
-        move |number| pacing::part_of(&record, number)
-    });
-    std::iter::once(first).chain(more.take_while(|file| file.exists()))
-}
-
 /// Sets the policy of `PROCESS=POLICY`.
 fn set_restart(scenario: &mut Scenario, text: &str) -> Result<(), ScenarioError> {
     let (name, policy) = text.split_once('=').unwrap_or((text, ""));
@@ -247,21 +240,6 @@ fn set_restart(scenario: &mut Scenario, text: &str) -> Result<(), ScenarioError>
 
 fn refused(origin: &str, key: &str, message: &str) -> ScenarioError {
     ScenarioError::Override { origin: origin.into(), key: key.into(), message: message.into() }
-}
-
-/// The record's digest; a record that a broken run left cut is made whole first.
-fn settle_record(record: &Path, broken: bool) -> Result<String, String> {
-    if broken && bus_analyzer::digest_file(record).is_err() {
-        let whole = record.with_extension("mcap.part");
-        let recovered = bus_analyzer::recover(record, &whole).map_err(|error| {
-            // half a file is of no use; there may be none
-            let _ = std::fs::remove_file(&whole);
-            error.to_string()
-        })?;
-        std::fs::rename(&whole, record).map_err(|error| error.to_string())?;
-        eprintln!("record made whole: {recovered}");
-    }
-    bus_analyzer::digest_file(record).map_err(|error| error.to_string())
 }
 
 /// The report's sweeps, in this process, on every core.

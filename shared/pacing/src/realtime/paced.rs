@@ -80,6 +80,11 @@ impl Paced {
         self.queue.insert(at, Waiting { due, grant, transfers: copy });
     }
 
+    /// Forgets the grants of boards that are gone.
+    pub fn forget(&mut self, boards: &[BoardId]) {
+        self.queue.retain(|waiting| boards.iter().all(|board| *board as u32 != waiting.grant.board));
+    }
+
     /// When the next step is due on the wall clock.
     pub fn due(&self) -> Option<u64> {
         self.queue.front().map(|waiting| waiting.due)

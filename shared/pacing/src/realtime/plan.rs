@@ -142,6 +142,31 @@ impl Plan {
         }
     }
 
+    /// The board of a task is gone: what it has not answered counts as what its last job did.
+    pub fn give_up(&mut self, task: u16) {
+        for open in self.open.iter_mut().filter(|open| open.task == task && open.rest.is_none()) {
+            open.rest = Some(self.rest[usize::from(task)].clone());
+        }
+        self.settle();
+    }
+
+    /// A task stops where it is, although the timing plane did not know that it would.
+    pub fn halt(&mut self, task: u16) {
+        self.settled.halt(task);
+        self.open.retain(|open| open.task != task);
+        self.settle();
+    }
+
+    /// A halted task takes up its releases again.
+    pub fn restart(&mut self, task: u16) {
+        self.settled.restart(task);
+    }
+
+    /// The jobs of a new board's task do nothing until it says otherwise.
+    pub fn forget_rest(&mut self, task: u16) {
+        self.rest[usize::from(task)].clear();
+    }
+
     /// A task's program changes from its next release on.
     pub fn set_program(&mut self, task: u16, program: &[Op]) {
         self.settled.set_program(task, program);
@@ -229,6 +254,21 @@ mod tests {
         plan.decided(1, 0, None);
         plan.decided(2, 0, None);
         assert!(tell(&mut plan, 3).log.transfers.iter().all(|transfer| transfer.job != 0));
+    }
+
+    #[test]
+    fn what_a_board_that_is_gone_has_not_answered_counts_as_its_last_job_and_its_task_stops() {
+        let mut plan = plan();
+        tell(&mut plan, 0);
+        plan.decided(0, 0, Some(vec![Op::Exec(MILLISECOND), write()]));
+        assert!(tell(&mut plan, 1).decision.is_some() && !plan.is_settled());
+        plan.give_up(0);
+        assert!(plan.is_settled());
+        plan.halt(0);
+        assert_eq!(tell(&mut plan, 2).decision, None);
+        plan.restart(0);
+        let decides = (3..6).any(|window| tell(&mut plan, window).decision.is_some());
+        assert!(decides, "it takes up its releases again");
     }
 
     #[test]

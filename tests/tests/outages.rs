@@ -45,8 +45,8 @@ fn a_board_that_goes_down_and_comes_up_again_gives_the_same_record_across_proces
         assert_eq!(stretches.len(), usize::from(board == "bus_analyzer"), "{kind} of {board}: {unrecorded}");
         for stretch in stretches {
             let [from, to] = [0, 1].map(|end| stretch[end].as_f64().expect("seconds"));
-            // down from 1.202 s, for 0.3 s and the 0.5 s of its boot
-            assert!((from - 1.202).abs() < 2e-3 && (to - 2.002).abs() < 6e-3, "{stretch}");
+            // down from 1.202 s, for 0.3 s and the 0.5 s of its boot; the chunk that it had begun goes with it
+            assert!(from > 0.5 && from < 1.2021 && (to - 2.002).abs() < 6e-3, "{stretch}");
         }
     }
 }
@@ -67,8 +67,10 @@ fn every_board_that_control_needs_leaves_a_braked_arm_behind() {
         for kind in ["crash", "hang"] {
             let row = row(board, kind);
             let after = row["detected_after_s"].as_f64().unwrap_or_else(|| panic!("{kind} of {board} undetected"));
-            // the output watchdog's 20 ms are the longest, after the period that began before
-            assert!(after < 0.026, "{kind} of {board}: {row}");
+            // a card that does not answer is seen in the next job, by the bus timer; the control computer by the output
+            // watchdog, 20 ms after its last heartbeat, and so is a da_io that hangs
+            let is_watched = board == "control_computer" || (board, kind) == ("da_io", "hang");
+            assert!(after < if is_watched { 0.0255 } else { 0.0055 }, "{kind} of {board}: {row}");
             // SS1 may take its 200 ms first, and the brakes 15 ms
             let braked =
                 row["braked_after_s"].as_f64().unwrap_or_else(|| panic!("{kind} of {board}: not braked: {row}"));

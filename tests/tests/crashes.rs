@@ -82,7 +82,13 @@ fn victim(run: &Running, name: &str) -> u32 {
 /// Sends a process that control needs the signal, `delay` after the start: the run ends with its name.
 fn harm(name: &str, with: Signal, pace: Pace, delay: Duration) {
     let bench = Bench::new();
-    let mut run = start_for(&bench, "30000", pace, delay);
+    // the length in real time is what a run locks memory for
+    let seconds = if pace == REAL_TIME { "100" } else { "30000" };
+    let mut run = start_for(&bench, seconds, pace, Duration::ZERO);
+    if pace == REAL_TIME {
+        run.wait_until_it_runs();
+    }
+    run.pause(delay);
     let pid = victim(&run, name);
     run.mark();
     signal(pid, with);
@@ -157,7 +163,7 @@ fn ten_draws_of_the_kill_matrix_in_real_time_end_safely() {
 #[test]
 fn a_chassis_killed_in_real_time_leaves_a_whole_record_and_nothing_else() {
     let bench = Bench::new();
-    let mut run = start_for(&bench, "30000", REAL_TIME, Duration::ZERO);
+    let mut run = start_for(&bench, "100", REAL_TIME, Duration::ZERO);
     run.wait_until_it_runs();
     run.pause(Duration::from_millis(500));
     run.mark();

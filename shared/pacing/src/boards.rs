@@ -226,6 +226,13 @@ impl<'f> Boards<'f> {
             if let Some(how) = self.life.died(process) {
                 return Err(RunError::Died { process: process.clone(), how: how.to_owned(), when });
             }
+            // whoever opens a channel with it waits for it too
+            if start.elapsed() > STALL
+                && let Some(process) = self.power.stopped()
+            {
+                let (process, waited_s) = (process.to_owned(), start.elapsed().as_secs_f64());
+                return Err(RunError::Stalled { process, how: "stopped by a signal".into(), waited_s, when });
+            }
             if start.elapsed() > READY_LIMIT {
                 return Err(RunError::Stalled {
                     process: self.remotes[remote].process.clone(),

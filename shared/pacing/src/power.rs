@@ -110,6 +110,12 @@ impl Power {
         }
     }
 
+    /// A process in state T that is not to hang.
+    pub fn stopped(&self) -> Option<&str> {
+        let names = self.children.iter().map(|(name, _)| name.as_str());
+        names.filter(|name| !self.hanging.iter().any(|hanging| hanging == name)).find(|name| self.is_stopped(name))
+    }
+
     /// Whether the process is in state T.
     pub fn is_stopped(&self, name: &str) -> bool {
         matches!(self.activity(name), Some(('T' | 't', _)))

@@ -91,7 +91,7 @@ impl Host {
     /// Forgets the mail that has come for a board that starts again.
     pub(crate) fn renew(&mut self, board: BoardId) -> Result<(), RunError> {
         self.inboxes[board as usize].clear();
-        self.windows[board as usize] = (0, 0);
+        self.begins_anywhere(board);
         Ok(self.exchange.renew(board)?)
     }
 
@@ -204,6 +204,11 @@ impl Host {
             rest: self.outputs.rest.take(),
             programs: std::mem::take(&mut self.outputs.programs),
         })
+    }
+
+    /// The board's next window begins where it will: it comes up while time goes on.
+    pub(crate) fn begins_anywhere(&mut self, board: BoardId) {
+        self.windows[board as usize] = (0, 0);
     }
 
     /// Whether a board can carry on with this window: time goes forwards, but for a window that `da_io` runs again, and

@@ -71,6 +71,7 @@ impl Realtime<'_> {
                     for board in &again.boards {
                         let answer = self.boards.ask(&self.first_grant(*board, now, flags::BOOT))?;
                         self.answered(*board, COMES_UP, answer)?;
+                        self.boards.host.begins_anywhere(*board);
                     }
                     self.take_part(&again, now);
                 }

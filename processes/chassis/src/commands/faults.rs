@@ -59,6 +59,7 @@ pub struct FaultsArgs {
 
 /// Runs the command and returns its exit code.
 pub fn run(args: FaultsArgs) -> miette::Result<u8> {
+    end_on_signals()?;
     let refused = |origin: &str, problem: Problem| -> ScenarioError {
         ScenarioError::Override { origin: origin.into(), key: problem.key, message: problem.message }
     };
@@ -84,7 +85,6 @@ pub fn run(args: FaultsArgs) -> miette::Result<u8> {
     }
     let seed = args.seed.unwrap_or(base.seed);
     let made = make_folder(&args.out)?;
-    end_on_signals()?;
     let draws = draw::draws(&plan, &base, seed);
     let outcome = carry_out(&plan, &base, &draws).and_then(|(rows, twins)| {
         Ok((rows, null::runs(&plan, &plan.null_document(&document)?.scenario()?, seed, &twins)?))

@@ -211,7 +211,7 @@ mod tests {
     fn a_program_that_no_board_answers_is_refused() {
         let rack = figure_6_1();
         let miss = Access { am: 0x3D, addr: 0xFF_0000, width: Width::D16, dir: Direction::Read, n: 1 };
-        let error = super::rack(&rack, &[vec![Op::Access(miss)]], None).unwrap_err();
+        let error = rack.check_program(0, &[Op::Access(miss)]).unwrap_err();
         assert!(matches!(error, RackError::NoSlave { addr: 0xFF_0000, .. }), "{error}");
     }
 }

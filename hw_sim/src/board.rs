@@ -289,7 +289,12 @@ impl HwSim {
 
 impl Board for HwSim {
     fn step(&mut self, _now: Ns, inputs: &Inputs, out: &mut Outputs) {
-        self.pending.extend_from_slice(&inputs.mail.amplifier);
+        // one that comes late acts at once, and none before those before it
+        let mut from = self.pending.last().map_or(inputs.from, |command| command.t.max(inputs.from));
+        for command in &inputs.mail.amplifier {
+            from = from.max(command.t);
+            self.pending.push(AmplifierCommand { t: from, ..*command });
+        }
         self.pending.drain(..self.pending.len().saturating_sub(PENDING));
         if inputs.boot {
             self.actuate(1);

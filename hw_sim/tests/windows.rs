@@ -128,6 +128,20 @@ fn a_brake_acts_from_its_exact_instant_on_and_torques_that_change_before_it_too(
 }
 
 #[test]
+fn a_command_that_comes_late_acts_at_once_and_none_before_those_before_it() {
+    let braked = |t| messages::AmplifierCommand { brake_released: 0, ..free(t, [0.0; 7]) };
+    let state = |commands: [_; 2]| {
+        let mut bench = Bench::new(&scenario(&["plant.integrator=semi-implicit"]));
+        bench.window(1_030_000, &[free(0, [0.0, -3.0, 0.0, 4.0, 0.0, 0.0, 0.0])]);
+        bench.window(2_000_000, &commands);
+        *bench.sim.state()
+    };
+    let push = |t| free(t, [0.0, -2.0, 0.0, 3.0, 0.0, 0.0, 0.0]);
+    assert_eq!(state([push(1_060_000), braked(1_010_000)]), state([push(1_060_000), braked(1_060_000)]));
+    assert_eq!(state([push(1_000_000), braked(1_010_000)]), state([push(1_030_000), braked(1_030_000)]));
+}
+
+#[test]
 fn a_closing_limit_switch_ends_the_window_and_opens_the_emergency_chain() {
     let mut bench = Bench::new(&slide(9.9999));
     bench.window(1_000_000, &[free(0, force(1000.0))]);

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 /// A longer yield means that somebody else had the processor: boards keep it for less, a busy loop for milliseconds.
 const YIELD_LIMIT: Duration = Duration::from_micros(500);
 /// Waits that block at once after such a yield.
-const BLOCK_AT_ONCE: u32 = 1000;
+const BLOCK_AT_ONCE: u32 = 10_000;
 /// Yields before blocking.
 const YIELDS: u32 = 20;
 /// Where the number of the turn lies, in the first bell's words.
@@ -128,13 +128,14 @@ impl Bell {
         for _ in 0..YIELDS {
             let before = Instant::now();
             std::thread::yield_now();
-            let rung = self.rung();
-            if rung > 0 {
-                return rung;
-            }
-            if before.elapsed() > YIELD_LIMIT {
+            // also where it has rung meanwhile: the ringer may be on another processor
+            let somebody_else = before.elapsed() > YIELD_LIMIT;
+            if somebody_else {
                 self.block_at_once = BLOCK_AT_ONCE;
-                break;
+            }
+            let rung = self.rung();
+            if rung > 0 || somebody_else {
+                return rung;
             }
         }
         0

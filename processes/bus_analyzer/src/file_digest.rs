@@ -2,7 +2,7 @@
 //! have to be held.
 
 use crate::digest::{add, hexadecimal};
-use crate::reading::{self, Raw, Records};
+use crate::reading;
 use crate::topics::WALL;
 use mcap::records::{MessageHeader, Record};
 use mcap::{McapError, McapResult};
@@ -131,31 +131,21 @@ impl Waiting {
 fn each_message(file: &mut File, mut take: impl FnMut(usize, Key, &[u8])) -> McapResult<()> {
     file.rewind()?;
     let (mut known, mut number) = (Known::default(), 0);
-    let mut look = |raw: &Raw| -> McapResult<()> {
-        match raw.parse()? {
-            Record::Schema { header, .. } => known.schema(header.id, header.name),
-            Record::Channel(channel) => known.channel(channel.id, channel.topic, channel.schema_id),
+    reading::each_record(file, |error| error, |record| {
+        match record {
+            Record::Schema { header, .. } => known.schema(header.id, header.name)?,
+            Record::Channel(channel) => known.channel(channel.id, channel.topic, channel.schema_id)?,
             Record::Message { header, data } => {
                 let (channel, schema) = known.of_message(&header)?;
                 if !channel.starts_with(WALL) {
                     take(number, Key { t: header.publish_time, channel, sequence: header.sequence, schema }, &data);
                     number += 1;
                 }
-                Ok(())
             }
-            _ => Ok(()),
+            _ => {}
         }
-    };
-    for raw in Records::of_file(file, false) {
-        let raw = raw?;
-        if raw.is_chunk() {
-            // a chunk holds no chunk
-            raw.records().try_for_each(|raw| look(&raw?))?;
-        } else {
-            look(&raw)?;
-        }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Names by number, as far as they have been announced.

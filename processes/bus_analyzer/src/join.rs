@@ -3,10 +3,9 @@
 //! Scenario, metadata and channels are the first part's: all parts say the same of them. Sequence numbers go on from part
 //! to part, so that the digest has an order. What nobody recorded between two parts is returned.
 
-use crate::record;
-use mcap::read::{ChunkFlattener, Options};
+use crate::{reading, record};
 use mcap::records::Record;
-use mcap::{Attachment, McapError, Writer};
+use mcap::McapError;
 use messages::Ns;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -46,7 +45,7 @@ pub struct Joined {
 pub fn join(parts: &[PathBuf], output: &Path) -> Result<Joined, JoinError> {
     let failed = |path: &Path| {
         let path = path.to_owned();
-        move |source| JoinError::Mcap { path, source }
+        move |source| JoinError::Mcap { path: path.clone(), source }
     };
     let sink = record::sink(output).map_err(|source| failed(output)(source.into()))?;
     let mut writer = record::options().create(sink).map_err(failed(output))?;
@@ -54,12 +53,11 @@ pub fn join(parts: &[PathBuf], output: &Path) -> Result<Joined, JoinError> {
     // the next message's number on each channel
     let mut next: BTreeMap<u16, u32> = BTreeMap::new();
     for (i, part) in parts.iter().enumerate() {
-        let file = std::fs::read(part).map_err(|source| JoinError::Read { path: part.clone(), source })?;
+        let file = reading::open(part).map_err(|source| JoinError::Read { path: part.clone(), source })?;
         let before = next.clone();
         let mut begins = i > 0;
-        for read in ChunkFlattener::new_with_options(&file, Options::ValidateChunkCrcs.into()).map_err(failed(part))? {
-            match read.map_err(failed(part))? {
-                Record::DataEnd(_) => break,
+        reading::each_record(&file, failed(part), |record| {
+            match record {
                 Record::Message { mut header, data } => {
                     let t = header.publish_time;
                     header.sequence =
@@ -69,39 +67,17 @@ pub fn join(parts: &[PathBuf], output: &Path) -> Result<Joined, JoinError> {
                         joined.gaps.push((joined.last, t));
                     }
                     joined.last = joined.last.max(t);
-                    writer.write_to_known_channel(&header, &data).map_err(failed(output))?;
+                    writer.write_to_known_channel(&header, &data)
                 }
-                other if i == 0 => describe(&mut writer, other).map_err(failed(output))?,
-                _ => {}
+                other if i == 0 => record::describe(&mut writer, other),
+                _ => Ok(()),
             }
-        }
+            .map_err(failed(output))
+        })?;
     }
     writer.finish().map_err(failed(output))?;
     writer.into_inner().flush().map_err(|source| failed(output)(source.into()))?;
     Ok(joined)
-}
-
-/// What a record says before its messages.
-fn describe<W: Write + io::Seek>(writer: &mut Writer<W>, record: Record<'_>) -> mcap::McapResult<()> {
-    match record {
-        Record::Schema { header, data } => {
-            writer.add_schema_with_id(header.id, &header.name, &header.encoding, &data)?;
-        }
-        Record::Channel(channel) => {
-            let mcap::records::Channel { id, schema_id, topic, message_encoding, metadata } = channel;
-            writer.add_channel_with_id(id, schema_id, &topic, &message_encoding, &metadata)?;
-        }
-        Record::Attachment { header, data, .. } => writer.attach(&Attachment {
-            log_time: header.log_time,
-            create_time: header.create_time,
-            name: header.name,
-            media_type: header.media_type,
-            data,
-        })?,
-        Record::Metadata(metadata) => writer.write_metadata(&metadata)?,
-        _ => {}
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -76,6 +76,23 @@ impl<R: Read> Records<R> {
     }
 }
 
+/// Shows `look` every record of a whole file, those in chunks one by one; `damaged` makes its error of what is wrong with the file.
+pub fn each_record<E>(
+    file: &File,
+    damaged: impl Fn(McapError) -> E,
+    mut look: impl FnMut(Record<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut look = |raw: McapResult<Raw>| look(raw.map_err(&damaged)?.parse().map_err(&damaged)?);
+    for raw in Records::of_file(file, false) {
+        match raw {
+            // a chunk holds no chunk
+            Ok(chunk) if chunk.is_chunk() => chunk.records().try_for_each(&mut look)?,
+            raw => look(raw)?,
+        }
+    }
+    Ok(())
+}
+
 impl<R: Read> Iterator for Records<R> {
     type Item = McapResult<Raw>;
 

@@ -72,6 +72,33 @@ pub(crate) fn sink(path: &Path) -> std::io::Result<NoSeek<BufWriter<File>>> {
     )))
 }
 
+/// Copies what a record says beside its messages; indexes are made anew.
+pub(crate) fn describe<W: Write + std::io::Seek>(
+    writer: &mut Writer<W>,
+    record: mcap::records::Record<'_>,
+) -> mcap::McapResult<()> {
+    use mcap::records::Record;
+    match record {
+        Record::Schema { header, data } => {
+            writer.add_schema_with_id(header.id, &header.name, &header.encoding, &data)?;
+        }
+        Record::Channel(channel) => {
+            let mcap::records::Channel { id, schema_id, topic, message_encoding, metadata } = channel;
+            writer.add_channel_with_id(id, schema_id, &topic, &message_encoding, &metadata)?;
+        }
+        Record::Attachment { header, data, .. } => writer.attach(&Attachment {
+            log_time: header.log_time,
+            create_time: header.create_time,
+            name: header.name,
+            media_type: header.media_type,
+            data,
+        })?,
+        Record::Metadata(metadata) => writer.write_metadata(&metadata)?,
+        _ => {}
+    }
+    Ok(())
+}
+
 impl Record {
     /// Creates the file with the scenario attached and all channels announced.
     pub fn create(

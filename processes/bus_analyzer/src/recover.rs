@@ -6,7 +6,7 @@
 use crate::reading::{self, Raw, Records};
 use crate::record::{self, METADATA};
 use mcap::records::Record;
-use mcap::{Attachment, McapError, Writer};
+use mcap::{McapError, Writer};
 use messages::Ns;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -201,27 +201,6 @@ impl Copy {
 
     fn take(&mut self, record: Record) -> mcap::McapResult<()> {
         match record {
-            Record::Schema { header, data } => {
-                self.writer
-                    .add_schema_with_id(header.id, &header.name, &header.encoding, &data)?;
-            }
-            Record::Channel(channel) => {
-                let mcap::records::Channel {
-                    id,
-                    schema_id,
-                    topic,
-                    message_encoding,
-                    metadata,
-                } = channel;
-                self.writer.add_channel_with_id(
-                    id,
-                    schema_id,
-                    &topic,
-                    &message_encoding,
-                    &metadata,
-                )?;
-                self.topics.insert(id, topic);
-            }
             Record::Message { header, data } if self.topics.contains_key(&header.channel_id) => {
                 self.writer.write_to_known_channel(&header, &data)?;
                 self.recovered.messages += 1;
@@ -236,25 +215,19 @@ impl Copy {
                         u64::from(header.sequence - expected);
                 }
             }
-            Record::Attachment { header, data, .. } => self.writer.attach(&Attachment {
-                log_time: header.log_time,
-                create_time: header.create_time,
-                name: header.name,
-                media_type: header.media_type,
-                data,
-            })?,
-            Record::Metadata(metadata) => {
-                if metadata.name == METADATA {
-                    self.recovered.duration = metadata
-                        .metadata
-                        .get("duration_ns")
-                        .and_then(|ns| ns.parse().ok());
+            other => {
+                match &other {
+                    Record::Channel(channel) => {
+                        self.topics.insert(channel.id, channel.topic.clone());
+                    }
+                    Record::Metadata(metadata) if metadata.name == METADATA => {
+                        let stated = metadata.metadata.get("duration_ns");
+                        self.recovered.duration = stated.and_then(|ns| ns.parse().ok());
+                    }
+                    _ => {}
                 }
-                self.writer.write_metadata(&metadata)?;
+                record::describe(&mut self.writer, other)?;
             }
-            // indexes are made anew; a message of a channel that was never announced cannot be read by anyone, and a chunk
-            // holds no chunk
-            _ => {}
         }
         Ok(())
     }

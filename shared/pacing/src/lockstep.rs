@@ -272,8 +272,12 @@ impl<'f> Lockstep<'f> {
             taken += place;
             let board = BOARDS[window.turns[taken].board as usize];
             match answer.early {
+                Some(early) if board != BoardId::HwSim => {
+                    let what = format!("an early return at {early} ns; only hw_sim may cut a window");
+                    return Err(RunError::BadAnswer { board: board.name(), what, when: at(window.from) });
+                }
                 Some(early) if answer.cuts(window.until()) => {
-                    self.cut(&mut window, board, early)?;
+                    self.cut(&mut window, early)?;
                     taken = 0;
                 }
                 _ => {
@@ -315,15 +319,12 @@ impl<'f> Lockstep<'f> {
         Ok(flow)
     }
 
-    /// A board has cut the window short: it is run again to that instant, by those that have acted before and by those
+    /// The arm has cut the window short: it is run again to that instant, by those that have acted before and by those
     /// that have not.
-    fn cut(&mut self, window: &mut Window, board: BoardId, early: Ns) -> Result<(), RunError> {
-        let bad = |what| Err(RunError::BadAnswer { board: board.name(), what, when: at(window.from) });
-        if board != BoardId::HwSim {
-            return bad(format!("an early return at {early} ns; only hw_sim may cut a window"));
-        }
+    fn cut(&mut self, window: &mut Window, early: Ns) -> Result<(), RunError> {
         if early <= window.from {
-            return bad(format!("an early return at {early} ns, outside ({}, {}] ns", window.from, window.until()));
+            let what = format!("an early return at {early} ns, outside ({}, {}] ns", window.from, window.until());
+            return Err(RunError::BadAnswer { board: BoardId::HwSim.name(), what, when: at(window.from) });
         }
         window.timing.clone_from(&self.timing);
         self.look_ahead(window, early);
@@ -341,13 +342,6 @@ impl<'f> Lockstep<'f> {
         answer: Answer,
         programs: &mut Vec<(u16, Vec<Op>)>,
     ) -> Result<(), RunError> {
-        if let Some(early) = answer.early.filter(|_| board != BoardId::HwSim) {
-            return Err(RunError::BadAnswer {
-                board: board.name(),
-                what: format!("an early return at {early} ns; only hw_sim may cut a window"),
-                when: at(window.from),
-            });
-        }
         if let (Some(task), Some(rest)) = (window.decides(), answer.rest)
             && self.boards.of_task[usize::from(task)] == board
         {

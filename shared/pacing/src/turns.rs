@@ -63,13 +63,6 @@ impl Boards<'_> {
         self.bells.as_ref().map_or(self.turns.due, |(bells, _)| bells.turn())
     }
 
-    fn set_due(&mut self, turn: u32) {
-        match &self.bells {
-            Some((bells, _)) => bells.set_turn(turn),
-            None => self.turns.due = turn,
-        }
-    }
-
     fn bell_of(&self, grant: Option<&Grant>) -> usize {
         let remote = grant.and_then(|grant| self.place[grant.board as usize]);
         remote.map_or(CHASSIS_BELL, |remote| self.remotes[remote].bell)
@@ -89,14 +82,11 @@ impl Boards<'_> {
             self.turns.next = self.turns.next.wrapping_add(1);
             self.put_grant(&grants[i])?;
         }
-        match grants.first() {
-            // the board before may have handed it on already
-            Some(first) if self.due() == first.turn => {
-                if let Some(remote) = self.place[first.board as usize] {
-                    self.ring(remote);
-                }
-            }
-            _ => {}
+        // the board before may have handed it on already
+        if let Some(first) = grants.first().filter(|first| first.turn == self.due())
+            && let Some(remote) = self.place[first.board as usize]
+        {
+            self.ring(remote);
         }
         Ok(())
     }
@@ -114,9 +104,9 @@ impl Boards<'_> {
                 if answer != Answer::default() {
                     return Ok(Some((taken, answer)));
                 }
-                self.set_due(grant.turn.wrapping_add(1));
-                if let Some(remote) = grants.get(taken + 1).and_then(|next| self.place[next.board as usize]) {
-                    self.ring(remote);
+                match &self.bells {
+                    Some((bells, _)) => hand_on(bells, grant),
+                    None => self.turns.due = grant.turn.wrapping_add(1),
                 }
                 continue;
             };
@@ -132,6 +122,9 @@ impl Boards<'_> {
     /// Turns that have been given and not taken are void; nobody is acting.
     pub fn void_turns(&mut self) {
         self.turns.ahead = 1;
-        self.set_due(self.turns.next);
+        match &self.bells {
+            Some((bells, _)) => bells.set_turn(self.turns.next),
+            None => self.turns.due = self.turns.next,
+        }
     }
 }

@@ -59,7 +59,7 @@ impl Safety {
         use State::*;
         let next = match (self.state, demand) {
             (_, Off) => Off,
-            (Off | Hold, Run | Degraded) if acknowledge && speed < AT_REST => demand,
+            _ if acknowledge && self.is_clear(demand, speed) => demand,
             (Off, _) => Off,
             (Stop, _) if speed < AT_REST || now >= self.since + self.stop_time => Off,
             (Stop, _) | (_, Stop) => Stop,

@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 
 /// No run takes longer.
 const WATCHDOG: Duration = Duration::from_secs(60);
+/// Folder of the shared-memory files.
+const SHARED_MEMORY: &str = "/dev/shm";
 const POLL: Duration = Duration::from_millis(5);
 /// Processes that outlive the command get this long to follow it, as they look at their lifeline now and then.
 const FOLLOW: Duration = Duration::from_secs(5);
@@ -162,20 +164,33 @@ impl Running {
             self.processes().into_iter().map(|process| format!("process {} ({})", process.name, process.pid));
         let files =
             machine::entries(&self.temporary).into_iter().map(|name| self.temporary.join(name).display().to_string());
-        let shared = machine::entries(Path::new("/dev/shm"))
-            .into_iter()
-            .filter(|name| self.folders.iter().any(|folder| name.contains(folder.as_str())))
-            .map(|name| format!("/dev/shm/{name}"));
+        let shared = self.shared_memory().map(|file| file.display().to_string());
         processes.chain(files).chain(shared).collect()
     }
 
     fn kill_all(&mut self) {
-        for process in self.processes() {
-            signal(process.pid, Signal::KILL);
+        loop {
+            let processes = self.processes();
+            processes.iter().for_each(|process| signal(process.pid, Signal::KILL));
+            if processes.iter().all(|process| process.pid == self.pid()) {
+                break;
+            }
+            std::thread::sleep(POLL);
         }
         // it may have ended already
         let _ = self.child.kill();
         let _ = self.child.wait();
+        // their folders go with the test: nobody could tell later whose this was
+        for file in self.shared_memory() {
+            let _ = std::fs::remove_file(file);
+        }
+    }
+
+    fn shared_memory(&self) -> impl Iterator<Item = PathBuf> {
+        machine::entries(Path::new(SHARED_MEMORY))
+            .into_iter()
+            .filter(|name| self.folders.iter().any(|folder| name.contains(folder.as_str())))
+            .map(|name| Path::new(SHARED_MEMORY).join(name))
     }
 
     fn join(&mut self) -> [String; 2] {

@@ -34,8 +34,8 @@ pub fn settle(record: &Path, broken: bool, reached_s: f64) -> Result<Settled, St
     for part in parts(record) {
         match make_whole(&part) {
             Ok(()) => whole.push(part),
-            // a recorder that was lost before it had written anything
             Err(reason) if whole.is_empty() => return Err(reason),
+            // a recorder that was lost again before it had written anything
             Err(reason) => eprintln!("warning: {reason}"),
         }
     }

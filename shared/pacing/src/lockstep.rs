@@ -212,7 +212,7 @@ impl<'f> Lockstep<'f> {
             self.boards.host.send(&self.own_mail)?;
         }
         let limit = end.min(window.from + MAX_WINDOW);
-        self.look_ahead(&mut window, limit);
+        self.look_ahead(&mut window, limit)?;
         self.plan_turns(&mut window, &WIRES);
         let tell = self.boards.turns.tells(window.number) || window.until() >= end;
         self.boards.give_turns(&mut window.turns, tell)?;
@@ -224,7 +224,7 @@ impl<'f> Lockstep<'f> {
 
     /// Runs the window's copy of the timing plane to the next decision point or `limit`, and sorts the transfers by the
     /// board they are made to.
-    fn look_ahead(&mut self, window: &mut Window, limit: Ns) {
+    fn look_ahead(&mut self, window: &mut Window, limit: Ns) -> Result<(), RunError> {
         window.log.clear();
         window.stop = window.timing.advance(limit, &mut window.log);
         // boards that are down have been told of, and this window began there; messages and clocks are told of in any
@@ -233,10 +233,13 @@ impl<'f> Lockstep<'f> {
         {
             window.stop = window.timing.advance(limit, &mut window.log);
         }
-        if let Stop::Overrun { task, .. } = window.stop {
-            window.timing.halt(task);
+        match window.stop {
+            Stop::Overrun { task, .. } => window.timing.halt(task),
+            Stop::Endless { task } => return Err(window.timing.endless(task).into()),
+            _ => {}
         }
         self.boards.sort_transfers(&window.log);
+        Ok(())
     }
 
     /// Who has a turn in a window: the boards on the wires, then the masters that decide or were written to.
@@ -327,7 +330,7 @@ impl<'f> Lockstep<'f> {
             return Err(RunError::BadAnswer { board: BoardId::HwSim.name(), what, when: at(window.from) });
         }
         window.timing.clone_from(&self.timing);
-        self.look_ahead(window, early);
+        self.look_ahead(window, early)?;
         self.plan_turns(window, &WIRES_AGAIN);
         let da_io = window.turns.iter_mut().filter(|turn| turn.board == BoardId::DaIo as u32);
         da_io.for_each(|turn| turn.flags |= flags::RERUN);

@@ -181,7 +181,10 @@ impl<'f> Realtime<'f> {
                     next = next.min(self.zero + from - HORIZON);
                 } else {
                     let limit = end.min(from + HORIZON);
-                    let window = draft.take().unwrap_or_else(|| self.plan.draft(limit));
+                    let window = match draft.take() {
+                        Some(window) => window,
+                        None => self.plan.draft(limit)?,
+                    };
                     let latest = window.until.saturating_sub(LEAD * self.stage_ns);
                     if self.plan.is_settled() || latest <= clock {
                         self.tell(window)?;

@@ -64,6 +64,10 @@ pub enum RackError {
         "program of task `{task}` needs {need_ns} ns on `{processor}`, its period is {period_ns} ns; a task that is to overrun says what comes of it (overrun = \"skip\", \"late\" or \"trip\")"
     )]
     ProgramTooLong { task: String, processor: String, need_ns: Ns, period_ns: Ns },
+    #[error(
+        "task `{task}` never ends: at {at_ns} ns of simulated time it, or what it causes, releases it again in no time; give its jobs execution time, or `{processor}` an interrupt_ns above 0"
+    )]
+    Endless { task: String, processor: String, at_ns: Ns },
     #[error("the rack has {n} {what}, {limit} at most are modelled")]
     TooMany { what: &'static str, n: usize, limit: usize },
 }

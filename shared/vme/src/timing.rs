@@ -52,6 +52,12 @@ pub enum Stop {
         /// Index in [`FaultPlan::faults`].
         fault: u16,
     },
+    /// Time stands still: jobs release each other, or themselves, in no time. [`Timing::endless`] says it in words; there
+    /// is no way on.
+    Endless {
+        /// Index of the task at which that was noticed.
+        task: u16,
+    },
 }
 
 /// Receives what happens, in the order of its instants.
@@ -142,6 +148,8 @@ pub struct Timing {
     lines: Vec<Line>,
     generators: Vec<Generator>,
     counters: Counters,
+    /// The instant at which tasks took their last steps, and how many.
+    steps: (Ns, u32),
 }
 
 impl Timing {
@@ -215,6 +223,7 @@ impl Timing {
             lines: vec![Line::default(); rack.interrupters.len()],
             generators,
             counters: Counters::default(),
+            steps: (0, 0),
             now: 0,
             limit: 0,
             agenda,
@@ -242,6 +251,12 @@ impl Timing {
     /// What went wrong so far.
     pub fn counters(&self) -> Counters {
         self.counters
+    }
+
+    /// What [`Stop::Endless`] means, in words.
+    pub fn endless(&self, task: u16) -> RackError {
+        let task = &self.wiring.rack.tasks[task as usize];
+        RackError::Endless { task: task.name.clone(), processor: task.processor.clone(), at_ns: self.now }
     }
 
     /// Releases of the task that were lost because the job before still ran.
@@ -334,6 +349,7 @@ impl Clone for Timing {
         self.lines.clone_from(&from.lines);
         self.generators.clone_from(&from.generators);
         self.counters = from.counters;
+        self.steps = from.steps;
     }
 }
 

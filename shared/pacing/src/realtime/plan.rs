@@ -6,7 +6,7 @@
 
 use board::{Ns, Op};
 use std::collections::VecDeque;
-use vme::{Log, Origin, Stop, Timing, Transfer};
+use vme::{Log, Origin, RackError, Stop, Timing, Transfer};
 
 /// Decisions that may be open; older ones are taken to have been made as the last ones.
 const MAX_OPEN: usize = 16;
@@ -83,8 +83,8 @@ impl Plan {
         self.open.is_empty()
     }
 
-    /// The next window, up to the next decision or `limit`, as far as is known now.
-    pub fn draft(&mut self, limit: Ns) -> Draft {
+    /// The next window, up to the next decision or `limit`, as far as is known now; an error where time stands still.
+    pub fn draft(&mut self, limit: Ns) -> Result<Draft, RackError> {
         self.ahead.clone_from(&self.settled);
         let (mut log, mut trips) = (Log::default(), Vec::new());
         let decision = loop {
@@ -102,12 +102,13 @@ impl Plan {
                 }
                 // the begin of a fault: the windows need not stop there
                 Stop::Fault { .. } => {}
+                Stop::Endless { task } => return Err(self.ahead.endless(task)),
             }
         };
         log.transfers.retain(|transfer| !self.told.iter().any(|(told, _)| *told == key(transfer)));
         log.jobs.retain(|job| !self.told_jobs.iter().any(|(told, _)| *told == (job.task, job.job)));
         trips.retain(|(at, ..)| *at >= self.told_to);
-        Draft { from: self.told_to, until: self.ahead.now().max(self.told_to), decision, log, trips }
+        Ok(Draft { from: self.told_to, until: self.ahead.now().max(self.told_to), decision, log, trips })
     }
 
     /// The last draft has been told, as that window.
@@ -186,8 +187,8 @@ impl Plan {
                     let known = at.and_then(|at| self.open.remove(at)).and_then(|open| open.rest);
                     self.settled.resume(task, known.as_ref().unwrap_or(&self.rest[usize::from(task)]));
                 }
-                // an earlier decision that came out differently has moved this one away
-                Stop::Limit => {
+                // an earlier decision that came out differently has moved this one away; the next draft ends the run
+                Stop::Limit | Stop::Endless { .. } => {
                     self.open.pop_front();
                 }
                 Stop::Overrun { task, .. } => self.settled.halt(task),
@@ -224,7 +225,7 @@ mod tests {
     }
 
     fn tell(plan: &mut Plan, window: u64) -> Draft {
-        let mut draft = plan.draft(plan.told_to() + 10 * MILLISECOND);
+        let mut draft = plan.draft(plan.told_to() + 10 * MILLISECOND).expect("time goes on");
         plan.tell(window, &draft);
         // the rack's interrupters have transfers of their own
         draft.log.transfers.retain(|transfer| transfer.origin == Origin::Program);

@@ -11,6 +11,8 @@ use crate::requester::{Client, Pending, ReleasePolicy};
 
 /// Ticks missed in a row after which a card goes on by polling.
 const MISSED_TICKS: u32 = 2;
+/// Steps that tasks take at one instant at most: far more than all operations of all programs.
+const STEPS_AT_ONCE: u32 = 100_000;
 
 /// What a processor carries out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -175,6 +177,7 @@ impl Timing {
         loop {
             let next = match self.choose(p) {
                 Some(Strand::Service) => self.serve(p),
+                Some(Strand::Task(t)) if self.is_endless() => Next::Stops(Stop::Endless { task: t }),
                 Some(Strand::Task(t)) => self.run(p, t, sink),
                 None => Next::Waits,
             };
@@ -184,6 +187,13 @@ impl Timing {
                 Next::Stops(stop) => return Some(stop),
             }
         }
+    }
+
+    /// Counts a task's step. True where so many have been taken at this instant that it never ends.
+    fn is_endless(&mut self) -> bool {
+        let (at, steps) = self.steps;
+        self.steps = (self.now, if at == self.now { steps.saturating_add(1) } else { 1 });
+        self.steps.1 > STEPS_AT_ONCE
     }
 
     /// The most urgent work: interrupts, then tasks by priority.

@@ -539,3 +539,73 @@ fn with_constant_latency_nobody_waits_for_anybody() {
         [(1, 750, 700), (0, 2100, 2100)]
     );
 }
+
+/// A task that its own card's interrupter releases, at once: by a tick at 5 µs, and whenever a job raises it.
+fn released_by_itself(overrun: Overrun, interrupt_ns: Ns) -> Timing {
+    let mut rack = rack(vec![Task { overrun: Some(overrun), ..task("loop", "cpu", 0, 100_000) }]);
+    rack.processors.push(Processor { interrupt_ns, ..Processor::new("cpu") });
+    rack.tasks[0].release = Release::Interrupt("self".into());
+    let ticks = Ticks { period_ns: 100_000, offset_ns: 5_000 };
+    rack.interrupters.push(Interrupter { local: true, ..interrupter("self", "cpu", 3, Some(ticks)) });
+    Timing::new(rack).unwrap()
+}
+
+#[test]
+fn a_task_that_releases_itself_in_no_time_is_named_and_time_stands_still() {
+    let mut timing = released_by_itself(Overrun::Late, 0);
+    timing.set_program(0, &[Op::Raise(3)]);
+    let mut log = Log::default();
+    for _ in 0..2 {
+        assert_eq!(timing.advance(1_000_000, &mut log), Stop::Endless { task: 0 });
+    }
+    let (task, processor) = ("loop".into(), "cpu".into());
+    assert_eq!(timing.endless(0), RackError::Endless { task, processor, at_ns: 5_000 });
+}
+
+#[test]
+fn a_task_that_decides_and_releases_itself_in_no_time_is_found_too() {
+    let mut timing = released_by_itself(Overrun::Late, 0);
+    timing.set_program(0, &[Op::Decide]);
+    let mut decisions = 0;
+    let mut ahead = timing.clone();
+    // as in lock step, where the windows' copies follow each other
+    let last = loop {
+        match timing.advance(1_000_000, &mut Log::default()) {
+            Stop::Decision { task, .. } => timing.resume(task, &[Op::Raise(3)]),
+            stop => break stop,
+        }
+        ahead.clone_from(&timing);
+        std::mem::swap(&mut ahead, &mut timing);
+        decisions += 1;
+    };
+    assert_eq!((last, timing.now()), (Stop::Endless { task: 0 }, 5_000));
+    assert!(decisions > 1_000);
+}
+
+#[test]
+fn a_task_that_releases_itself_goes_on_where_that_takes_time_or_the_release_is_lost() {
+    for (overrun, interrupt_ns, jobs) in [(Overrun::Late, 10, 9_498), (Overrun::Skip, 0, 1)] {
+        let mut timing = released_by_itself(overrun, interrupt_ns);
+        timing.set_program(0, &[Op::Raise(3)]);
+        assert_eq!(run(&mut timing, 100_000).jobs.len(), jobs, "{overrun:?}");
+    }
+}
+
+#[test]
+fn a_task_that_polls_a_status_bit_in_no_time_is_named() {
+    let mut rack = rack(vec![task("force", "cpu", 0, 100_000)]);
+    rack.bus = crate::rack::Bus {
+        arbitration_ns: 0,
+        chain_ns: 0,
+        address_ns: 0,
+        handshake_ns: 0,
+        read_stall_ns: 0,
+        ..crate::rack::Bus::default()
+    };
+    rack.slaves[0].read_ns = 0;
+    rack.interrupters.push(interrupter("sample", "ram", 5, None));
+    rack.tasks[0].release =
+        Release::Poll(Poll { interrupter: "sample".into(), am: AM, addr: RAM, width: Width::D16, interval_ns: 0 });
+    let mut timing = Timing::new(rack).unwrap();
+    assert_eq!(timing.advance(1_000_000, &mut Log::default()), Stop::Endless { task: 0 });
+}

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Long versions of the tests, some hours in all: every process of the whole rack killed and stopped at ROUNDS (50) moments each, in
-# lock step and in real time; hostile files and messages, FUZZ_SECONDS (default 120) of each kind; the bus's closed forms at ten
+# Long versions of the tests, some hours in all: every process of the whole rack, the chassis too, killed and stopped at ROUNDS (50)
+# moments each, in lock step and in real time; hostile files and messages, FUZZ_SECONDS (default 120) of each kind; the bus's closed forms at ten
 # million transfers, and 10 000 random racks against their bounds; ten minutes in real time at 1 kHz in which no message may be
 # lost or counted twice; the whole fault campaign with ten seeds, and an hour in contact without a fault: ./scripts/soak.sh [ROUNDS]
 set -euo pipefail

@@ -108,7 +108,8 @@ fn harm(name: &str, with: Signal, pace: Pace, delay: Duration) {
 /// The same with a process that the run goes on without: it is started again, and the report says what is not recorded.
 fn harm_and_go_on(name: &str, with: Signal, pace: Pace, delay: Duration) {
     let bench = Bench::new();
-    let seconds = if pace == REAL_TIME { "4" } else { "12" };
+    // in lock step as long as it takes for the signal to come in time
+    let seconds = if pace == REAL_TIME { "4" } else { "40" };
     let mut run = start_for(&bench, seconds, pace, Duration::ZERO);
     if pace == REAL_TIME {
         run.wait_until_it_runs();
@@ -137,14 +138,13 @@ fn harm_and_go_on(name: &str, with: Signal, pace: Pace, delay: Duration) {
     assert!(!bench.path("out/nominal.part2.mcap").exists());
 }
 
-/// Draw `n` of the kill matrix: each process in its turn, killed and stopped alternately, at a moment drawn.
+/// Draw `n` of the kill matrix: each process and the chassis in its turn, killed and stopped alternately, at a moment drawn.
 fn harm_any(n: usize, pace: Pace, draw: &mut Draw) {
     let with = if n % 2 == 0 { Signal::KILL } else { Signal::STOP };
-    let name = NEEDED.iter().chain(&DISPENSABLE).nth(n % (NEEDED.len() + DISPENSABLE.len())).expect("a process");
-    if DISPENSABLE.contains(name) {
-        harm_and_go_on(name, with, pace, drawn_delay(draw) / 5);
-    } else {
-        harm(name, with, pace, drawn_delay(draw));
+    match NEEDED.iter().chain(&DISPENSABLE).nth(n % (NEEDED.len() + DISPENSABLE.len() + 1)) {
+        Some(name) if DISPENSABLE.contains(name) => harm_and_go_on(name, with, pace, drawn_delay(draw) / 5),
+        Some(name) => harm(name, with, pace, drawn_delay(draw)),
+        None => harm_the_chassis(with, pace, drawn_delay(draw)),
     }
 }
 
@@ -160,16 +160,82 @@ fn ten_draws_of_the_kill_matrix_in_real_time_end_safely() {
     (0..10).for_each(|n| harm_any(n, REAL_TIME, &mut draw));
 }
 
+/// The chassis itself: killed, whether it runs or is stopped, it leaves a record that is whole up to there, and nothing else.
+fn harm_the_chassis(with: Signal, pace: Pace, delay: Duration) {
+    let bench = Bench::new();
+    let seconds = if pace == REAL_TIME { "100" } else { "30000" };
+    let mut run = start_for(&bench, seconds, pace, Duration::ZERO);
+    if pace == REAL_TIME {
+        run.wait_until_it_runs();
+    } else {
+        wait_for_record(&bench);
+    }
+    run.pause(delay);
+    run.mark();
+    signal(run.pid(), with);
+    if with == Signal::STOP {
+        run.pause(Duration::from_millis(300));
+        signal(run.pid(), Signal::KILL);
+    }
+    let outcome = run.wait().expect_nothing_left();
+    assert_eq!(outcome.status.code(), None, "ended by the signal: {}", outcome.stderr);
+    println!("chassis, {with:?} after {delay:?} {pace:?}: over in {:.2?}", outcome.took);
+    assert!(recorded_s(&bench) > 0.0);
+}
+
 #[test]
-fn a_chassis_killed_in_real_time_leaves_a_whole_record_and_nothing_else() {
+fn a_chassis_that_is_killed_or_killed_while_it_is_stopped_leaves_a_whole_record_and_nothing_else() {
+    for pace in [LOCK_STEP, REAL_TIME] {
+        for with in [Signal::KILL, Signal::STOP] {
+            harm_the_chassis(with, pace, Duration::from_millis(500));
+        }
+    }
+}
+
+/// Stops the chassis while a run goes on, as Ctrl-Z does, and lets it go on.
+fn stop_and_continue(run: &mut Running, stopped: Duration) {
+    signal(run.pid(), Signal::STOP);
+    run.pause(stopped);
+    signal(run.pid(), Signal::CONT);
+}
+
+#[test]
+fn in_lock_step_simulated_time_stands_still_with_a_stopped_chassis_and_the_digest_is_the_same() {
+    let bench = Bench::new();
+    let scenario = bench.scenario("s.toml", &[]);
+    let whole = bench.digest(scenario, 40.0, &["--in-process"]);
+    let mut run = bench.start(&["run", scenario, "--duration", "40", "--out", "out"]);
+    run.wait_for_processes(NEEDED.len() + DISPENSABLE.len());
+    wait_for_record(&bench);
+    // longer than a board may be silent
+    stop_and_continue(&mut run, Duration::from_secs(6));
+    run.wait().expect_code(0).expect_nothing_left();
+    assert_eq!(bench.digest_of(RECORD), whole);
+}
+
+#[test]
+fn in_real_time_a_chassis_that_was_stopped_ends_the_run_with_its_name_once_it_goes_on() {
     let bench = Bench::new();
     let mut run = start_for(&bench, "100", REAL_TIME, Duration::ZERO);
     run.wait_until_it_runs();
     run.pause(Duration::from_millis(500));
+    stop_and_continue(&mut run, Duration::from_millis(1500));
     run.mark();
-    signal(run.pid(), Signal::KILL);
-    run.wait().expect_nothing_left();
-    assert!(recorded_s(&bench) > 0.1);
+    let outcome = expect_failure_of(run.wait(), "chassis").expect_message("stopped by a signal");
+    let (reached, recorded) = (simulated_s(&outcome.stderr), recorded_s(&bench));
+    // within a horizon of 10 ms the boards have nothing more to do, and none of them goes on by itself
+    assert!(reached > 0.1 && recorded >= reached - 0.05 && recorded < reached + 0.05, "{recorded} s, {reached} s");
+}
+
+#[test]
+fn a_chassis_that_is_told_to_go_on_but_was_not_stopped_goes_on() {
+    for pace in [LOCK_STEP, REAL_TIME] {
+        let bench = Bench::new();
+        let mut run = start_for(&bench, "2", pace, Duration::ZERO);
+        signal(run.pid(), Signal::CONT);
+        run.pause(Duration::ZERO);
+        run.wait().expect_code(0).expect_nothing_left();
+    }
 }
 
 #[test]
@@ -185,24 +251,44 @@ fn a_recorder_that_is_not_to_be_started_again_ends_the_run() {
     expect_failure_of(run.wait(), "bus_analyzer");
 }
 
-#[test]
-#[ignore = "hours; scripts/soak.sh runs it"]
-fn every_process_killed_and_stopped_at_many_moments() {
+/// Every process at many moments.
+fn harm_each(with: Signal, pace: Pace, seed: u64) {
     let rounds: u64 = std::env::var("SOAK_ROUNDS").ok().and_then(|rounds| rounds.parse().ok()).unwrap_or(50);
-    let mut draw = Draw::new(2);
+    let mut draw = Draw::new(seed);
     for round in 0..rounds {
         println!("round {round}");
-        for (pace, with) in
-            [LOCK_STEP, REAL_TIME].into_iter().flat_map(|pace| [(pace, Signal::KILL), (pace, Signal::STOP)])
-        {
-            for name in NEEDED {
-                harm(name, with, pace, drawn_delay(&mut draw));
-            }
-            for name in DISPENSABLE {
-                harm_and_go_on(name, with, pace, drawn_delay(&mut draw) / 5);
-            }
+        for name in NEEDED {
+            harm(name, with, pace, drawn_delay(&mut draw));
         }
+        for name in DISPENSABLE {
+            harm_and_go_on(name, with, pace, drawn_delay(&mut draw) / 5);
+        }
+        harm_the_chassis(with, pace, drawn_delay(&mut draw));
     }
+}
+
+#[test]
+#[ignore = "long; scripts/soak.sh runs it"]
+fn every_process_killed_in_lock_step_at_many_moments() {
+    harm_each(Signal::KILL, LOCK_STEP, 20);
+}
+
+#[test]
+#[ignore = "long; scripts/soak.sh runs it"]
+fn every_process_stopped_in_lock_step_at_many_moments() {
+    harm_each(Signal::STOP, LOCK_STEP, 21);
+}
+
+#[test]
+#[ignore = "long; scripts/soak.sh runs it"]
+fn every_process_killed_in_real_time_at_many_moments() {
+    harm_each(Signal::KILL, REAL_TIME, 22);
+}
+
+#[test]
+#[ignore = "long; scripts/soak.sh runs it"]
+fn every_process_stopped_in_real_time_at_many_moments() {
+    harm_each(Signal::STOP, REAL_TIME, 23);
 }
 
 /// A file system of so many KiB, unmounted at its end; none where the system refuses.
@@ -260,21 +346,12 @@ fn ctrl_c_ends_the_run_in_order() {
 }
 
 #[test]
-fn a_killed_chassis_leaves_a_whole_record_and_nothing_else() {
-    for delay in [0, 900] {
-        let bench = Bench::new();
-        let mut run = start(&bench, Duration::from_millis(delay));
-        if delay > 0 {
-            wait_for_record(&bench);
-        }
-        run.mark();
-        signal(run.pid(), Signal::KILL);
-        let outcome = run.wait().expect_nothing_left();
-        println!("SIGKILL of the chassis after {delay} ms: over in {:.2?}", outcome.took);
-        if delay > 0 {
-            assert!(recorded_s(&bench) > 0.1);
-        }
-    }
+fn a_chassis_killed_while_its_processes_start_leaves_nothing() {
+    let bench = Bench::new();
+    let mut run = start(&bench, Duration::ZERO);
+    run.mark();
+    signal(run.pid(), Signal::KILL);
+    run.wait().expect_nothing_left();
 }
 
 #[test]

@@ -208,7 +208,7 @@ impl<'f> Boards<'f> {
 
     /// Waits until a process that has been started says that it is ready.
     pub fn wait_until_ready(&mut self, remote: usize) -> Result<(), RunError> {
-        let (start, when) = (Instant::now(), at(self.reached));
+        let (when, mut waited) = (at(self.reached), Duration::ZERO);
         loop {
             match self.remotes[remote].reply(self.reached)? {
                 Some((_, READY, _)) => return Ok(()),
@@ -221,36 +221,39 @@ impl<'f> Boards<'f> {
                 }
                 None => {}
             }
-            self.listen()?;
+            if !self.listen()? {
+                waited += WATCH_PERIOD;
+            }
             let process = &self.remotes[remote].process;
             if let Some(how) = self.life.died(process) {
                 return Err(RunError::Died { process: process.clone(), how: how.to_owned(), when });
             }
             // whoever opens a channel with it waits for it too
-            if start.elapsed() > STALL
+            if waited > STALL
                 && let Some(process) = self.power.stopped()
             {
-                let (process, waited_s) = (process.to_owned(), start.elapsed().as_secs_f64());
+                let (process, waited_s) = (process.to_owned(), waited.as_secs_f64());
                 return Err(RunError::Stalled { process, how: "stopped by a signal".into(), waited_s, when });
             }
-            if start.elapsed() > READY_LIMIT {
+            if waited > READY_LIMIT {
                 return Err(RunError::Stalled {
                     process: self.remotes[remote].process.clone(),
                     how: "it did not report ready".into(),
-                    waited_s: start.elapsed().as_secs_f64(),
+                    waited_s: waited.as_secs_f64(),
                     when,
                 });
             }
         }
     }
 
-    /// Waits a little for the chassis' bell.
-    fn listen(&mut self) -> Result<(), RunError> {
-        let Some((_, bell)) = &mut self.bells else { return Ok(()) };
-        if bell.wait(WATCH_PERIOD) == 0 {
-            self.watch()?;
+    /// Waits for the chassis' bell; false where it has not rung for [`WATCH_PERIOD`].
+    fn listen(&mut self) -> Result<bool, RunError> {
+        let Some((_, bell)) = &mut self.bells else { return Ok(true) };
+        if bell.wait(WATCH_PERIOD) > 0 {
+            return Ok(true);
         }
-        Ok(())
+        self.watch()?;
+        Ok(false)
     }
 
     /// An error where a process has ended or the user wants to stop.
@@ -468,8 +471,9 @@ impl<'f> Boards<'f> {
         remote: usize,
         handed_on: &dyn Fn(&Bells) -> bool,
     ) -> Result<Option<(BoardId, u64, Answer)>, RunError> {
-        // wall time and processor time of the board, at first and since it was last seen at work
-        let (mut first, mut waiting): (Option<(Instant, u64)>, Option<(Instant, u64)>) = (None, None);
+        // wall time and processor time of the board at first; periods waited and processor time since it was last seen at
+        // work. Time for which the chassis itself was stopped is no time that it waited
+        let (mut first, mut waiting): (Option<(Instant, u64)>, Option<(u32, u64)>) = (None, None);
         let mut amiss = Ok(());
         loop {
             let Some((bells, bell)) = &mut self.bells else { return Ok(None) };
@@ -495,11 +499,12 @@ impl<'f> Boards<'f> {
             let name = &self.remotes[remote].process;
             let used = self.power.used(name);
             let (asked, used_at_first) = *first.get_or_insert((Instant::now(), used));
-            let (since, used_before) = *waiting.get_or_insert((Instant::now(), used));
+            let (periods, used_before) = waiting.get_or_insert((0, used));
+            *periods += 1;
             let how = if used.saturating_sub(used_at_first) > SPIN_S * rustix::param::clock_ticks_per_second() {
                 Some(format!("it has used {SPIN_S} s of processor time"))
-            } else if since.elapsed() > STALL {
-                self.power.idle(name, used_before).map(str::to_owned)
+            } else if WATCH_PERIOD * *periods > STALL {
+                self.power.idle(name, *used_before).map(str::to_owned)
             } else {
                 continue;
             };

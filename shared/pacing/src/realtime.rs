@@ -10,6 +10,7 @@ mod lives;
 mod paced;
 mod plan;
 mod rights;
+mod stops;
 mod writes;
 
 pub(crate) use paced::Paced;
@@ -25,6 +26,7 @@ use messages::{BOARDS, Event, EventKind, Grant, Severity, Span, TransferRecord, 
 use lives::Booting;
 use paced::{stage, stage_ns};
 use plan::{Draft, Plan};
+use stops::Stops;
 use std::collections::VecDeque;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -62,6 +64,7 @@ pub struct Realtime<'f> {
     /// Processes that have been started again and do not take part yet.
     booting: Vec<Booting>,
     debts: Vec<Debt>,
+    stops: Stops,
     watched: Instant,
     own_mail: Mail,
 }
@@ -97,6 +100,7 @@ impl<'f> Realtime<'f> {
         for remote in 0..boards.remotes.len() {
             boards.await_reply(remote)?;
         }
+        let stops = Stops::new().map_err(|error| RunError::Refused { what: format!("SIGCONT: {error}") })?;
         let zero = wall_ns() + START_UP;
         if boards.spans.is_some() {
             boards.host.measure(true);
@@ -117,6 +121,7 @@ impl<'f> Realtime<'f> {
             told: VecDeque::new(),
             booting: Vec::new(),
             debts,
+            stops,
             watched: Instant::now(),
             own_mail: Mail::default(),
         })
@@ -357,6 +362,11 @@ impl<'f> Realtime<'f> {
     }
 
     fn watch(&mut self) -> Result<(), RunError> {
+        if let Some(away) = self.stops.was_stopped().filter(|away| *away > STOPPED) {
+            let (process, how) = (BoardId::Chassis.name().into(), "stopped by a signal".into());
+            let (waited_s, when) = (away.as_secs_f64(), at(self.boards.reached));
+            return Err(RunError::Stalled { process, how, waited_s, when });
+        }
         if self.watched.elapsed() < WATCH_PERIOD {
             return Ok(());
         }

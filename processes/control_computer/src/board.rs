@@ -88,6 +88,9 @@ impl ControlComputer {
             segment: NO_SEGMENT,
             state: State::Run as u32,
             heartbeat: 0,
+            last: NO_SEGMENT,
+            reserved: 0,
+            last_start: 0,
             position: [0.0; 3],
             wrench: [0.0; 6],
         };
@@ -196,7 +199,7 @@ impl ControlComputer {
                 if self.last.is_some() {
                     commands::check_motion(&segment, &trajectory.last_target(), &self.limits)?;
                 }
-                if segment.start < trajectory.last_start() {
+                if trajectory.last().is_some_and(|last| segment.start < last.start) {
                     return Err(Refusal::Times);
                 }
                 if !trajectory.has_room() {
@@ -259,6 +262,8 @@ impl ControlComputer {
                 card.ram().read().clear && self.findings.demanded().0 <= State::Degraded
             }
         };
+        let last = self.pipeline.trajectory().last().map(|last| (last.index, last.start));
+        let (last, last_start) = last.unwrap_or((NO_SEGMENT, 0));
         self.telemetry = [
             self.telemetry[1],
             Telemetry {
@@ -268,6 +273,9 @@ impl ControlComputer {
                 segment: self.begun,
                 state: state as u32 | if clear { Telemetry::CLEAR } else { 0 },
                 heartbeat: job,
+                last,
+                reserved: 0,
+                last_start,
                 position: done.x.p.into(),
                 wrench: done.contact.fe.into(),
             },

@@ -80,13 +80,12 @@ impl Trajectory {
         moving.next().map_or(self.from.p, |segment| segment.target.p)
     }
 
-    /// Start of the last segment known, ns.
-    pub fn last_start(&self) -> Ns {
-        let last = match self.waiting {
-            0 => self.active,
-            n => self.queue[(self.first + n - 1) % QUEUE],
-        };
-        last.map_or(0, |segment| segment.start)
+    /// The last segment known.
+    pub fn last(&self) -> Option<&Segment> {
+        match self.waiting {
+            0 => self.active.as_ref(),
+            n => self.queue[(self.first + n - 1) % QUEUE].as_ref(),
+        }
     }
 
     /// Lets a segment wait; the caller has asked [`Trajectory::has_room`].
@@ -277,7 +276,7 @@ mod tests {
         let mut trajectory = Trajectory::new(start(), impedance(9.0));
         trajectory.push(segment(0, SECOND, PathKind::PointToPoint, target()));
         trajectory.push(segment(1, 2 * SECOND, PathKind::PointToPoint, start()));
-        assert_eq!(trajectory.last_start(), 2 * SECOND);
+        assert_eq!(trajectory.last().map(|last| (last.index, last.start)), Some((1, 2 * SECOND)));
         assert_eq!(trajectory.start_due(SECOND - 1), None);
         assert_eq!((trajectory.segment(), trajectory.impedance().mass[0]), (None, 9.0));
         assert_eq!(trajectory.start_due(SECOND + 5), Some(0));

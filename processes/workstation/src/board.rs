@@ -27,6 +27,8 @@ pub struct Workstation {
     operator: Operator,
     schedule: Schedule,
     progress: Progress,
+    /// Started again, and has not seen how far the task is.
+    rejoins: bool,
     /// Its program has ended.
     gone: bool,
     told: Told,
@@ -59,6 +61,7 @@ impl Workstation {
             period,
             schedule: Schedule::new(scenario, |site| site == Site::Board(BoardId::Workstation)),
             progress: Progress::default(),
+            rejoins: false,
             gone: false,
             told: Told::default(),
             cut_off: false,
@@ -119,6 +122,9 @@ impl Workstation {
     /// What to send, by what the state block says.
     fn poll(&mut self, now: Ns, block: Option<&Telemetry>) -> Poll {
         let accepted = block.map(|block| block.epoch);
+        if let Some(block) = block.filter(|_| std::mem::take(&mut self.rejoins)) {
+            self.rejoin(now, block);
+        }
         match (self.operator.look(now, block), accepted) {
             (Act::Acknowledge, Some(accepted)) => self.sender.acknowledge(accepted),
             // the first command is written before then
@@ -127,6 +133,16 @@ impl Workstation {
             _ => {}
         }
         self.sender.poll(now, accepted)
+    }
+
+    /// Goes on behind the last segment that the control computer knows, whoever sent it and whenever it starts. Where it has
+    /// lost them in a stop that is over, the task goes on with the segment that was interrupted.
+    fn rejoin(&mut self, now: Ns, block: &Telemetry) {
+        if block.last != u32::MAX {
+            self.sender.go_on_behind(block.last, block.last_start, block.epoch);
+        } else if block.segment != u32::MAX && !block.is_stopped() {
+            self.sender.go_on_with(block.segment, now + self.period, block.epoch);
+        }
     }
 
     fn decide(&mut self, now: Ns, out: &mut Outputs) {
@@ -160,6 +176,7 @@ impl Board for Workstation {
             if inputs.until > 0 {
                 // started again in a running rack: what has begun before has been told of
                 self.schedule.advance(&mut self.progress, inputs.until - 1, |_, _| {});
+                self.rejoins = true;
             }
             out.programs.push((self.task, self.program()));
         }

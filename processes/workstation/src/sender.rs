@@ -5,7 +5,8 @@
 //! knows a repetition by it). After [`SENDINGS`] times a command is given up and the next ones take their turn.
 //!
 //! After a stop nothing of what was sent counts any longer: commands then go on with the epoch behind the one accepted last,
-//! whoever accepted it.
+//! whoever accepted it. So they do where the console is started again: the plan alone does not tell how far the task is, nor
+//! how much later than planned.
 
 use messages::{Command, CommandKind, PathKind};
 use vme::Ns;
@@ -66,7 +67,7 @@ impl Sender {
         let mut poll = Poll::default();
         if let Some(accepted) = accepted {
             let done = self.commands.partition_point(|command| command.epoch <= accepted);
-            // accepted from a program that ran before this one
+            // whoever has sent them
             self.sent = self.sent.max(done);
             if done > self.settled {
                 self.settle(done);
@@ -106,17 +107,29 @@ impl Sender {
 
     /// Has the task go on with this segment from `start` on: it and those behind it last as long as planned.
     pub fn go_on_with(&mut self, segment: u32, start: Ns, accepted: u32) {
+        let commands = self.moved(segment, start, accepted);
+        self.begin_anew(commands);
+    }
+
+    /// Has the task go on behind this segment, which starts at `start` and has been accepted with epoch `accepted`.
+    pub fn go_on_behind(&mut self, segment: u32, start: Ns, accepted: u32) {
+        let mut commands = self.moved(segment, start, accepted.wrapping_sub(1));
+        commands.drain(..commands.len().min(1));
+        self.begin_anew(commands);
+    }
+
+    /// The commands from this segment on, which starts at `start`, with the epochs behind `accepted`.
+    fn moved(&self, segment: u32, start: Ns, accepted: u32) -> Vec<Command> {
         let left = self.plan.iter().skip_while(|command| command.segment != segment);
         let planned = left.clone().next().map_or(0, |first| first.start);
-        let moved = |t: Ns| t - planned + start;
+        let moved = |t: Ns| start.saturating_add(t - planned);
         let again = |(further, command): (u32, &Command)| Command {
             epoch: accepted.wrapping_add(further),
             start: moved(command.start),
             end: moved(command.end),
             ..*command
         };
-        let commands = (1..).zip(left).map(again).collect();
-        self.begin_anew(commands);
+        (1..).zip(left).map(again).collect()
     }
 
     fn begin_anew(&mut self, commands: Vec<Command>) {
@@ -187,9 +200,29 @@ mod tests {
     }
 
     #[test]
+    fn a_console_that_is_started_again_goes_on_behind_the_last_segment_known_however_late_that_is() {
+        let mut plan = commands(&[0, 3, 7]);
+        (0..).zip(&mut plan).for_each(|(i, command)| {
+            (command.segment, command.end) = (i, command.start + 2 * SECOND);
+        });
+        let mut sender = Sender::new(plan, 2 * SECOND);
+        // the second segment, five seconds late, with the epoch that it has after a stop
+        sender.go_on_behind(1, 8 * SECOND, 6);
+        let times: Vec<_> = sender.commands().iter().map(|again| (again.epoch, again.start, again.end)).collect();
+        assert_eq!(times, [(7, 12 * SECOND, 14 * SECOND)]);
+        assert_eq!(sender.poll(9 * SECOND, Some(6)).send, (0, 0));
+        assert_eq!(sender.poll(10 * SECOND, Some(6)).send, (0, 1));
+        for (segment, start) in [(2, 7 * SECOND), (9, 1), (u32::MAX, Ns::MAX)] {
+            sender.go_on_behind(segment, start, 7);
+            assert_eq!(sender.commands(), [], "nothing is behind segment {segment}");
+        }
+    }
+
+    #[test]
     fn an_epoch_at_the_end_of_its_range_breaks_nothing() {
         let mut sender = Sender::new(commands(&[0, 3, 7]), 2 * SECOND);
         for accepted in [u32::MAX, u32::MAX - 1] {
+            sender.go_on_behind(0, Ns::MAX, accepted);
             sender.acknowledge(accepted);
             sender.go_on_with(0, SECOND, accepted);
             for t in 0..20 {
@@ -299,13 +332,6 @@ mod tests {
                 }
             );
         }
-    }
-
-    #[test]
-    fn a_console_that_is_started_again_goes_on_behind_what_was_accepted() {
-        let mut sender = Sender::new(commands(&[0, 3, 6, 9]), SECOND);
-        assert_eq!(sender.poll(4 * SECOND, Some(2)).send, (2, 2));
-        assert_eq!(sender.poll(5 * SECOND, Some(2)).send, (2, 3));
     }
 
     #[test]

@@ -86,9 +86,9 @@ fn at_boot_the_program_reads_the_state_block_and_decides() {
         addr: base + mailbox::TELEMETRY,
         width: Width::D32,
         dir: Direction::Read,
-        n: 26,
+        n: 30,
     };
-    assert_eq!(size_of::<Telemetry>(), 4 * 26);
+    assert_eq!(size_of::<Telemetry>(), 4 * 30);
     let task = scenario.task_of("workstation").unwrap();
     assert_eq!(
         out.programs,

@@ -18,6 +18,12 @@ pub struct Telemetry {
     pub state: u32,
     /// Heartbeat: activation number of the control task.
     pub heartbeat: u32,
+    /// Index of the last segment that is known, in force or waiting; `u32::MAX` where none is, as after a stop.
+    pub last: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// When that segment starts, ns.
+    pub last_start: u64,
     /// Tool position in the task frame, m.
     pub position: [f64; 3],
     /// Measured wrench in the task frame, N and Nm.

@@ -10,8 +10,8 @@ use crate::history::{History, counts_per_turn};
 use crate::velocity::{self, TIMER_NS};
 use board::{Board, Inputs, Outputs};
 use messages::registers::encoder;
-use messages::{BusWord, Event, JOINTS, TransferRecord};
-use scenario::{Scenario, VelocitySource, nanoseconds};
+use messages::{BoardId, BusWord, Event, JOINTS, TransferRecord};
+use scenario::{FaultKind, Occurrence, Scenario, Site, VelocitySource, nanoseconds};
 use vme::Ns;
 
 /// Number of cards.
@@ -29,6 +29,8 @@ pub struct EncoderIf {
     channels: Channels,
     /// The channels have followed the shafts up to here.
     followed: f64,
+    /// When the cards' clock gains, from and until, and by which part of one.
+    drifts: Vec<(Ns, Ns, f64)>,
 }
 
 impl EncoderIf {
@@ -53,7 +55,14 @@ impl EncoderIf {
             history: History::new(&drives, delay + TIMER_NS, scenario.plant.rate_hz),
             channels: Channels::new(scenario, core::array::from_fn(|i| counts_per_turn(&drives, i))),
             followed: f64::NEG_INFINITY,
+            drifts: drifts(scenario),
         })
+    }
+
+    /// How fast the cards' clock goes at `t`.
+    fn clock_rate(&self, t: Ns) -> f64 {
+        let holding = self.drifts.iter().filter(|(from, until, _)| (*from..*until).contains(&t));
+        1.0 + holding.map(|(.., gain)| gain).sum::<f64>()
     }
 
     /// Card and register offset behind an address.
@@ -83,6 +92,7 @@ impl EncoderIf {
         let Some((joint, register)) = self.channel(addr) else {
             return 0;
         };
+        let rate = self.clock_rate(t);
         let t = self.delayed(t);
         match register {
             encoder::COUNT => {
@@ -92,8 +102,10 @@ impl EncoderIf {
             encoder::VELOCITY if self.channels.is_open(joint) => 0,
             encoder::VELOCITY => {
                 let speed = match self.velocity {
+                    // edges are timed by the cards' clock: one that is fast finds them further apart
                     VelocitySource::EdgeTime => {
-                        velocity::edge_time(&self.history, joint, t, self.window as f64)
+                        let window = (self.window as f64 / rate).min(TIMER_NS as f64);
+                        velocity::edge_time(&self.history, joint, t, window) / rate
                     }
                     VelocitySource::Tachometer => self.history.speed(joint, t),
                 };
@@ -144,6 +156,16 @@ impl EncoderIf {
     fn delayed(&self, t: Ns) -> f64 {
         t as f64 - self.delay as f64
     }
+}
+
+/// When the cards' clock drifts.
+fn drifts(scenario: &Scenario) -> Vec<(Ns, Ns, f64)> {
+    let drift = |occurrence: Occurrence| {
+        let fault = &scenario.faults[occurrence.fault];
+        let own = scenario.fault_site(occurrence.fault) == Ok(Site::Board(BoardId::EncoderIf));
+        (own && fault.kind == FaultKind::ClockDrift).then_some((occurrence.from, occurrence.until, fault.amount * 1e-6))
+    };
+    scenario.occurrences().into_iter().filter_map(drift).collect()
 }
 
 impl Board for EncoderIf {

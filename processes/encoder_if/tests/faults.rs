@@ -4,7 +4,7 @@ mod cards;
 
 use cards::{Bench, MS, scenario};
 use messages::registers::encoder::{
-    CARD_STATUS, COUNT, INDEX, STATUS_INDEX, STATUS_LEVEL, STATUS_QUADRATURE, VELOCITY,
+    CARD_STATUS, COUNT, INDEX, STATUS_INDEX, STATUS_LEVEL, STATUS_QUADRATURE, VELOCITY, VELOCITY_LSB,
 };
 
 /// Shafts that turn at 20 000 counts/s, with one fault of joint 2 from 10 ms on, for 10 ms.
@@ -47,4 +47,19 @@ fn a_counter_that_wraps_too_early_jumps_back() {
     // 8 bits, sign-extended
     assert_eq!((bench.read(9 * MS, 1, COUNT), bench.read(11 * MS, 1, COUNT)), (180, 220 - 256));
     assert_eq!(bench.read(21 * MS, 1, COUNT), 420);
+}
+
+#[test]
+fn a_clock_that_gains_finds_the_edges_further_apart_and_shows_speeds_too_low_while_it_drifts() {
+    for ppm in [5_000.0, -5_000.0] {
+        let fault = format!(
+            "fault=[{{ target='encoder_if', kind='clock-drift', start_s=0.03, duration_s=0.01, amount={ppm:?} }}]"
+        );
+        let mut bench = Bench::new(&scenario(&[&fault]), |t| 0.5 + 20_000.0 * t);
+        let shown = [29, 35, 41].map(|t| f64::from(bench.read(t * MS, 1, VELOCITY)) * VELOCITY_LSB);
+        let drifting = 20_000.0 / (1.0 + ppm * 1e-6);
+        for (shown, expected) in shown.into_iter().zip([20_000.0, drifting, 20_000.0]) {
+            assert!((shown - expected).abs() <= VELOCITY_LSB, "{ppm} ppm: {shown}, expected {expected}");
+        }
+    }
 }

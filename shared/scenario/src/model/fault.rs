@@ -123,7 +123,8 @@ fault_kinds! {
     /// Task: its execution times are multiplied by `amount`.
     Slow = "slow";
     /// Interface card or control computer: its clock gains `amount` parts per million. Its stamps and the ticks of its
-    /// timers and interrupters go by it; its sampling keeps pace.
+    /// timers and interrupters go by it, and so do the times between edges from which an encoder card finds speeds: one
+    /// that is fast shows them too low. The force sensor's sampling keeps pace.
     ClockDrift = "clock-drift";
     /// Workstation: its program ends; no more polls, no more commands.
     Gone = "gone";

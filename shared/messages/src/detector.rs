@@ -1,4 +1,11 @@
 //! What in the rack sees that something is wrong.
+//!
+//! Whoever computes is watched by a word that it has to keep moving, so that memory which still answers with old data does
+//! not pass for life: the control computer by its heartbeat in the I/O card ([`Detector::OutputWatchdog`]), the receiver by its
+//! sample counter ([`Detector::ForceAge`]), the first of two processor cards by the number of its hand-over block
+//! ([`Detector::HandOver`]), the workstation by its polls ([`Detector::CommandAge`]). Counters of the encoder cards and
+//! converters are hardware that needs no processor. A board that hangs takes its bus interface with it in this rack, so
+//! that its cards end in BERR* before any of that ([`Detector::BusError`]).
 
 macro_rules! detectors {
     ($($(#[$doc:meta])* $detector:ident = $number:literal $name:literal;)*) => {
@@ -70,7 +77,7 @@ detectors! {
     MissedTick = 23 "missed-tick";
     /// Link status of a bus adaptor.
     LinkStatus = 24 "link-status";
-    /// A heartbeat stands still.
+    /// The control computer is powered up in the middle of a run: its heartbeat has stood still.
     Heartbeat = 25 "heartbeat";
     /// Execution time over its budget.
     Overrun = 26 "overrun";

@@ -14,22 +14,25 @@ pub struct ScenarioArgs {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Validate a scenario with all its variants.
-    Check {
-        /// A built-in scenario or a file.
-        scenario: String,
-    },
+    Check(Stated),
     /// Print a scenario as TOML, defaults included.
-    Show {
-        /// A built-in scenario or a file.
-        scenario: String,
-    },
+    Show(Stated),
+}
+
+#[derive(Debug, Args)]
+struct Stated {
+    /// A built-in scenario or a file.
+    scenario: String,
+    /// Override a key of the scenario; may be repeated.
+    #[arg(long, value_name = "KEY.PATH=VALUE")]
+    set: Vec<String>,
 }
 
 /// Runs the command and returns its exit code.
 pub fn run(args: ScenarioArgs) -> miette::Result<u8> {
     match args.command {
-        Command::Check { scenario } => {
-            let document = scenario::load(&scenario, &[])?;
+        Command::Check(Stated { scenario, set }) => {
+            let document = scenario::load(&scenario, &set)?;
             let variants = document.variants()?;
             for (variant, resolved) in &variants {
                 for warning in scenario::warnings(resolved) {
@@ -43,8 +46,8 @@ pub fn run(args: ScenarioArgs) -> miette::Result<u8> {
             println!("{scenario}: ok, {} variant(s), {:.1} s each", variants.len(), document.scenario()?.duration());
             Ok(0)
         }
-        Command::Show { scenario } => {
-            print!("{}", toml::to_string(&scenario::load(&scenario, &[])?.scenario()?).into_diagnostic()?);
+        Command::Show(Stated { scenario, set }) => {
+            print!("{}", toml::to_string(&scenario::load(&scenario, &set)?.scenario()?).into_diagnostic()?);
             Ok(0)
         }
     }

@@ -15,6 +15,8 @@ pub fn fault(target: &str, kind: &str, start_s: f64, more: &[(&str, Value)]) -> 
 pub struct FaultRow {
     /// Detector that saw it; `none` where nothing did.
     pub detected_by: String,
+    /// The card that did not answer; `none` where it was none.
+    pub card: String,
     /// From its begin until it was seen, ms; NaN where nothing saw it.
     pub after_ms: f64,
     /// From its begin until the arm began to stop, ms; NaN where it did not.
@@ -57,6 +59,7 @@ impl FaultRow {
         let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);
         FaultRow {
             detected_by: row["detected_by"].as_str().unwrap_or("none").into(),
+            card: row["card"].as_str().unwrap_or("none").into(),
             after_ms: 1e3 * number("detected_after_s"),
             stopping_after_ms: 1e3 * number("stopping_after_s"),
             reaction: row["reaction"].as_str().expect("a state").into(),

@@ -67,6 +67,22 @@ fn no_grant_is_told_from_no_answer_by_the_access_timer() {
 }
 
 #[test]
+fn the_card_that_does_not_answer_is_named_by_the_address_of_the_cycle_that_timed_out() {
+    for (target, kind, card) in [
+        ("encoder-3", "no-slave", "encoder-3"),
+        ("force-sensor", "no-slave", "force-sensor"),
+        // its first register that a job reads
+        ("da_io", "crash", "parallel-io"),
+        // nobody was asked
+        ("cpu-1", "starvation", "none"),
+        ("bus", "stuck-bus", "none"),
+    ] {
+        let row = FaultRow::of_one(fault(target, kind, &[]), 1.5, &[]);
+        assert_eq!(row.card, card, "{row:?}");
+    }
+}
+
+#[test]
 fn a_card_whose_interrupts_get_lost_misses_two_ticks_and_goes_on_by_polling() {
     let interrupt = |text: &str| text.parse::<Table>().expect("TOML")["value"].clone();
     let edits = [

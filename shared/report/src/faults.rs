@@ -28,6 +28,8 @@ pub struct FaultRow {
     pub detected_after_s: Option<f64>,
     /// That event.
     pub detected_by: Option<String>,
+    /// The card that did not answer, where it is one: whose window the address lies in.
+    pub card: Option<String>,
     /// From its begin until the control computer began to stop the arm, s.
     pub stopping_after_s: Option<f64>,
     /// From its begin until the brakes of all joints had fallen in for the rest of its time, s; none = they had not.
@@ -99,6 +101,7 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
         injected_s: seconds(from),
         detected_after_s: first.map(after),
         detected_by: first.and_then(detector),
+        card: first.and_then(|event| silent_card(scenario, event)).map(str::to_owned),
         stopping_after_s: stopping.map(after),
         braked_after_s: braked.map(|t| seconds(t) - seconds(from)),
         reaction: STATES.get(gravest.unwrap_or(0)).copied().unwrap_or("unknown").into(),
@@ -115,6 +118,36 @@ pub(crate) fn trips(trace: &Trace) -> impl Iterator<Item = (f64, String)> {
     let from = injected.map_or(vme::Ns::MAX, |event| event.t);
     let fired = move |event: &&Event| event.kind == EventKind::Detected as u32 && event.t < from;
     trace.events.iter().filter(fired).filter_map(|event| Some((seconds(event.t), detector(event)?)))
+}
+
+/// The card that has not answered, by the address at which the bus timer ended a cycle. Where the bus was not granted, no card
+/// was asked.
+fn silent_card<'s>(scenario: &'s Scenario, event: &Event) -> Option<&'s str> {
+    let address = match EventKind::from_number(event.kind)? {
+        EventKind::BusError => event.b,
+        EventKind::Detected => event.a,
+        _ => return None,
+    };
+    let answers = |slave: &&vme::rack::Slave| (address as u32).wrapping_sub(slave.base) < slave.size;
+    let of_bus_timer = event.cause == Detector::BusError as u32;
+    of_bus_timer.then(|| scenario.rack.slaves.iter().find(answers)).flatten().map(vme::rack::Slave::card)
+}
+
+/// Cards that did not answer, each since when, s, and transfers that the bus was not granted for, in the order of time.
+pub(crate) fn silences(scenario: &Scenario, trace: &Trace) -> Vec<String> {
+    let mut found: Vec<(Option<&str>, f64)> = Vec::new();
+    for event in trace.events.iter().filter(|event| event.kind == EventKind::BusError as u32) {
+        let card = silent_card(scenario, event);
+        let known = card.is_some() || event.cause == Detector::AccessTimer as u32;
+        if known && !found.iter().any(|(other, _)| *other == card) {
+            found.push((card, seconds(event.t)));
+        }
+    }
+    let words = |(card, at_s): (Option<&str>, f64)| match card {
+        Some(card) => format!("card {card} did not answer at {at_s:.4} s (BERR*)"),
+        None => format!("the bus was not granted at {at_s:.4} s (access timer)"),
+    };
+    found.into_iter().map(words).collect()
 }
 
 /// What an event was detected by: the detector, or what such an event itself is.
@@ -139,7 +172,10 @@ pub(crate) fn cells(rows: &[FaultRow]) -> Vec<Vec<String>> {
         vec![
             format!("{}: {} of {}", row.fault, row.kind, row.target),
             format!("{:.4}", row.injected_s),
-            row.detected_by.clone().unwrap_or("undetected".into()),
+            match (&row.detected_by, &row.card) {
+                (Some(detector), Some(card)) => format!("{detector}: {card}"),
+                (detector, _) => detector.clone().unwrap_or("undetected".into()),
+            },
             ms(row.detected_after_s),
             ms(row.stopping_after_s),
             ms(row.braked_after_s),

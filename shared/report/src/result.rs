@@ -148,6 +148,7 @@ impl VariantResult {
         if ledger.errors() > 0 {
             findings.push(format!("{} bus transfers ended in BERR* or time-out", ledger.errors()));
         }
+        findings.extend(faults::silences(scenario, trace));
         for task in trace.bus.iter().flat_map(|bus| &bus.tasks) {
             if task.lost_releases > 0 {
                 findings

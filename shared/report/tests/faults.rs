@@ -72,3 +72,23 @@ fn a_detector_that_fires_before_anything_was_injected_is_a_finding() {
     assert_eq!(found.map(String::as_str), Some("encoder-jump fired at 1.250 s: nothing was injected"));
     assert_eq!(result.faults[0].detected_by, None);
 }
+
+#[test]
+fn a_card_that_does_not_answer_is_found_by_its_address_and_a_bus_that_is_not_granted_blames_no_card() {
+    let (_, scenario) = table_5_3().swap_remove(0);
+    let address = f64::from(scenario.card_base("encoder-2").expect("card") + 4);
+    let result = result(&[
+        event(5000, EventKind::FaultInjected, 0.0, 0.0, None),
+        event(5003, EventKind::Detected, address, 0.0, Some(Detector::BusError)),
+        event(5003, EventKind::BusError, 17.0, address, Some(Detector::BusError)),
+        event(5008, EventKind::BusError, 18.0, address, Some(Detector::BusError)),
+        event(6000, EventKind::FaultInjected, 1.0, 0.0, None),
+        event(6004, EventKind::Detected, address, 0.0, Some(Detector::AccessTimer)),
+        event(6004, EventKind::BusError, 19.0, address, Some(Detector::AccessTimer)),
+    ]);
+    let cards: Vec<_> = result.faults.iter().map(|row| row.card.as_deref()).collect();
+    assert_eq!(cards, [Some("encoder-2"), None]);
+    let silent = |text: &&String| text.contains("did not answer") || text.contains("was not granted");
+    let found: Vec<_> = result.findings.iter().filter(silent).collect();
+    assert_eq!(found, ["card encoder-2 did not answer at 5.0030 s (BERR*)", "the bus was not granted at 6.0040 s (access timer)"]);
+}

@@ -8,8 +8,7 @@ use toml::Value;
 fn interrupted(bench: &Bench, board: &str, kind: &str, wait_s: Option<f64>) {
     let more = [("duration_s", Value::Float(0.5))];
     let mut edits = vec![
-        ("segment.1.until_s", Value::Float(8.0)),
-        ("segment.2.until_s", Value::Float(9.0)),
+        ("segment.1.until_s", Value::Float(6.0)),
         ("fault", Value::Array(vec![fault(board, kind, 2.0, &more)])),
     ];
     edits.extend(wait_s.map(|wait| ("safety.acknowledge_s", Value::Float(wait))));
@@ -18,15 +17,23 @@ fn interrupted(bench: &Bench, board: &str, kind: &str, wait_s: Option<f64>) {
 
 /// The variant's report and the record's digest.
 fn run(bench: &Bench, out: &str, options: &[&str]) -> (Json, String) {
-    let line = ["run", "interrupted.toml", "--duration", "8", "--json", "--out", out];
+    let line = ["run", "interrupted.toml", "--duration", "9", "--json", "--out", out];
     let outcome = bench.run(&[&line, options].concat()).expect_code(0).expect_nothing_left();
     let report: Json = serde_json::from_str(&outcome.stdout).expect("JSON");
     (report["variants"][0].clone(), bench.digest_of(&format!("{out}/nominal.mcap")))
 }
 
-/// Mean force of the last second, N.
+/// Mean force of the second segment's last second, N, where it was carried out.
 fn closing_n(variant: &Json) -> f64 {
-    variant["segments"][1]["mean_n"].as_f64().expect("the last second's force")
+    let row = &variant["segments"][1];
+    row["mean_n"].as_f64().unwrap_or_else(|| panic!("no last second: {row}"))
+}
+
+/// How a segment went, and when, s.
+fn course(variant: &Json, segment: usize) -> (String, f64, f64) {
+    let row = &variant["segments"][segment];
+    let time = |key: &str| row[key].as_f64().expect("time");
+    (row["course"].as_str().expect("course").into(), time("start_s"), time("end_s"))
 }
 
 #[test]
@@ -51,6 +58,11 @@ fn an_arm_stopped_by_a_lost_board_regulates_force_again_once_acknowledged() {
         println!("{kind} of {board}: {mean:.1} N of 60 N at the end");
         // what the scheme's friction leaves of it takes its time to wear off
         assert!((mean - 60.0).abs() < 6.0, "{kind} of {board}: {mean} N of 60 N at the end");
+        // stopped within it, begun anew and carried out in its whole length
+        let (how, start, end) = course(&variant, 1);
+        assert_eq!(how, "again");
+        assert!(start > 3.0 && (end - start - 5.0).abs() < 0.006, "{kind} of {board}: {start} to {end} s");
+        assert_eq!(course(&variant, 0), ("as_planned".into(), 0.0, 1.0));
         if board == "encoder_if" || board == "control_computer" {
             assert_eq!(run(&bench, "across", &[]).1, digest, "{board}: across processes");
         }
@@ -61,8 +73,40 @@ fn an_arm_stopped_by_a_lost_board_regulates_force_again_once_acknowledged() {
 fn nobody_acknowledges_unless_the_scenario_says_so() {
     let bench = Bench::new();
     interrupted(&bench, "encoder_if", "crash", None);
-    let mean = closing_n(&run(&bench, "out", &["--in-process"]).0);
-    assert!((mean - 60.0).abs() > 10.0, "{mean} N on the brakes: as they caught it, not as commanded");
+    let variant = run(&bench, "out", &["--in-process"]).0;
+    let (how, start, end) = course(&variant, 1);
+    assert_eq!((how.as_str(), start), ("cut_off", 1.0));
+    // SS1 begins with the next job
+    assert!(end > 2.0 && end < 2.0055, "cut off at {end} s");
+    assert_eq!(variant["segments"][1]["mean_n"], Json::Null);
+    assert_eq!(course(&variant, 2), ("not_begun".into(), 6.0, 7.0));
+}
+
+#[test]
+fn a_console_that_dies_after_the_task_was_resumed_comes_up_and_sends_the_segments_left_so_much_later() {
+    let bench = Bench::new();
+    interrupted(&bench, "encoder_if", "crash", Some(0.5));
+    let sound = run(&bench, "sound", &["--in-process"]).0;
+    let (_, _, end) = course(&sound, 1);
+    assert_eq!(course(&sound, 2).1, end, "the third segment follows the second");
+    // up again before the control computer misses it, which would hold the arm
+    let mut both = vec![fault("encoder_if", "crash", 2.0, &[("duration_s", Value::Float(0.5))])];
+    both.push(fault("workstation", "crash", 5.52, &[("duration_s", Value::Float(0.01))]));
+    bench.scenario(
+        "interrupted.toml",
+        &[
+            ("segment.1.until_s", Value::Float(6.0)),
+            ("safety.acknowledge_s", Value::Float(0.5)),
+            ("process.workstation.boot_ms", Value::Float(50.0)),
+            ("fault", Value::Array(both)),
+        ],
+    );
+    let (variant, digest) = run(&bench, "inside", &["--in-process"]);
+    assert_eq!(variant["faults"][1]["reaction"], "run", "{}", variant["faults"][1]);
+    assert_eq!(course(&variant, 2), course(&sound, 2), "as if it had never been away");
+    assert_eq!(course(&variant, 2).0, "later");
+    // the real process is killed
+    assert_eq!(run(&bench, "across", &[]).1, digest);
 }
 
 #[test]
@@ -70,7 +114,7 @@ fn the_second_of_two_cards_is_acknowledged_through_the_first() {
     let bench = Bench::new();
     let crash = "fault=[{ target='encoder_if', kind='crash', start_s=2.0, duration_s=0.1 }]";
     let line = ["run", "processor-time", "--variant", "two-68030-customised", "--in-process", "--no-record", "--json"];
-    let changes = ["--set", crash, "--set", "safety.acknowledge_s=0.3", "--set", "segment.1.until_s=6"];
+    let changes = ["--set", crash, "--set", "safety.acknowledge_s=0.3", "--set", "segment.1.until_s=3.5"];
     let length = ["--duration", "6", "--out", "out"];
     // cards that do not answer cost the task some releases, of which the scenario allows none
     let outcome = bench.run(&[&line[..], &changes, &length].concat()).expect_code(4).expect_nothing_left();

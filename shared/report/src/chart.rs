@@ -213,7 +213,8 @@ fn sample(of: &Series, grid: &[f64], scale: f64) -> Vec<Option<f64>> {
 
 fn commanded(report: &RunReport, grid: &[f64]) -> Vec<Option<f64>> {
     let rows = report.variants.first().map_or(&[][..], |variant| &variant.segments);
-    grid.iter().map(|t| rows.iter().find(|row| row.start_s <= *t && *t < row.end_s)?.commanded_n).collect()
+    let holds = |row: &&crate::SegmentRow, t: f64| row.begun() && row.start_s <= t && t < row.end_s;
+    grid.iter().map(|t| rows.iter().find(|row| holds(row, *t))?.commanded_n).collect()
 }
 
 /// Limits on forces, as areas of the force picture.

@@ -75,7 +75,7 @@ impl RunMeasures {
         until: f64,
     ) -> RunMeasures {
         let contact = first_contact(trace);
-        let last = rows.iter().rfind(|row| row.start_s < until);
+        let last = rows.iter().rfind(|row| row.begun() && row.start_s < until);
         let envelope = last.and_then(|row| Envelope::of(position, row.start_s, row.end_s.min(until)));
         RunMeasures {
             first_contact_s: contact,
@@ -170,8 +170,8 @@ fn greatest(values: impl Iterator<Item = f64>) -> Option<f64> {
 /// The running maximum at the moment at which the force has first fallen 5 % of F_d below it, or at the
 /// end of the segment in which the contact began.
 fn first_peak(force: &Series, rows: &[SegmentRow], contact: f64, until: f64) -> Option<f64> {
-    let row = rows.iter().find(|row| row.start_s <= contact && contact < row.end_s)?;
-    let end = row.end_s.min(until);
+    let row = rows.iter().find(|row| row.begun() && row.whole_s.0 <= contact && contact < row.whole_s.1)?;
+    let end = row.whole_s.1.min(until);
     let fall = 0.05 * row.commanded_n.unwrap_or(0.0).abs();
     let mut peak: Option<f64> = None;
     for (_, y) in force.within(contact, end) {
@@ -213,6 +213,9 @@ mod tests {
             name: String::new(),
             start_s: 0.0,
             end_s: 9.0,
+            course: crate::Course::AsPlanned,
+            planned: true,
+            whole_s: (0.0, 9.0),
             force_controlled: true,
             reached: true,
             commanded_n: Some(wanted),

@@ -10,6 +10,7 @@ use crate::measures::{Bounds, RunMeasures, first_contact};
 use crate::path::Way;
 use crate::segments::{SegmentRow, Signals, rows};
 use crate::series::Series;
+use crate::stretches::{Stretch, stretches};
 use crate::trace::{Ended, Trace, seconds};
 use crate::verdict::{Check, Verdict, check_relations, checks};
 use messages::EventKind;
@@ -91,8 +92,10 @@ impl VariantResult {
         };
         let ideal = scenario.report.ideal.then(|| ideal(scenario, &segments, axis, &desired, until));
         let contact = first_contact(trace);
+        let courses = stretches(&segments, trace, until);
         let segment_rows = rows(
             &segments,
+            &courses,
             axis,
             &Signals {
                 force: &force,
@@ -105,8 +108,10 @@ impl VariantResult {
                 until,
             },
         );
+        // nothing stops the ideal
+        let planned = stretches(&segments, &Trace::default(), until);
         let ideal_rows =
-            ideal.as_ref().map_or_else(Vec::new, |ideal| ideal_rows(&segments, axis, ideal, &desired, until));
+            ideal.as_ref().map_or_else(Vec::new, |ideal| ideal_rows(&segments, &planned, axis, ideal, &desired, until));
         let bounds = Bounds::of(scenario)?;
         let run = RunMeasures::of(
             trace,
@@ -251,6 +256,7 @@ fn way(scenario: &Scenario, trace: &Trace) -> Result<Way, String> {
 
 fn ideal_rows(
     segments: &[scenario::ResolvedSegment],
+    stretches: &[Stretch],
     axis: usize,
     ideal: &Ideal,
     desired: &Series,
@@ -267,7 +273,7 @@ fn ideal_rows(
         contact,
         until,
     };
-    rows(segments, axis, &signals)
+    rows(segments, stretches, axis, &signals)
 }
 
 /// A key varied over values.

@@ -2,6 +2,7 @@
 //! the report's axis, positions the true tool point's; both of the plant, not as the controller sees them.
 
 use crate::series::Series;
+use crate::stretches::{Course, Stretch};
 use scenario::ResolvedSegment;
 use serde::Serialize;
 
@@ -15,10 +16,18 @@ const OPENING_S: f64 = 2.0;
 pub struct SegmentRow {
     /// Name.
     pub name: String,
-    /// Start, s.
+    /// Start, s; of a segment that a stop has interrupted, of the last time that it was carried out.
     pub start_s: f64,
-    /// End, s.
+    /// End, s; of one that was cut off, when that was.
     pub end_s: f64,
+    /// How it went.
+    pub course: Course,
+    /// The run was long enough for it, as planned.
+    #[serde(skip)]
+    pub planned: bool,
+    /// From the first time that it began to its end, or, where that was a stop, to what followed, s.
+    #[serde(skip)]
+    pub whole_s: (f64, f64),
     /// The axis is force-controlled (S = 0).
     pub force_controlled: bool,
     /// The run went through the whole of it.
@@ -33,9 +42,9 @@ pub struct SegmentRow {
     pub rms_error_n: Option<f64>,
     /// Rms of force − F_d over all but the first 2 s, N.
     pub tracking_error_n: Option<f64>,
-    /// Least force, N.
+    /// Least force, N; where a stop has interrupted the segment, from the first time that it began, the stop included.
     pub least_n: Option<f64>,
-    /// Greatest force, N.
+    /// Greatest force, N, in the same time.
     pub peak_n: Option<f64>,
     /// 90 % rise time, s: from the first contact if that falls into the segment, otherwise from the
     /// segment's start and the force there, to 90 % of the way to F_d.
@@ -48,6 +57,18 @@ pub struct SegmentRow {
     pub ideal_position_deviation_m: Option<f64>,
     /// Greatest |Xᵗ − ideal|, m.
     pub ideal_target_deviation_m: Option<f64>,
+}
+
+impl SegmentRow {
+    /// No stop has kept it from beginning.
+    pub(crate) fn begun(&self) -> bool {
+        self.course != Course::NotBegun
+    }
+
+    /// The run was asked to end before it: nobody can blame the arm for what it lacks.
+    pub(crate) fn is_beyond_the_run(&self) -> bool {
+        !self.reached && !self.planned
+    }
 }
 
 /// What rows are made from; all along the report's axis.
@@ -66,22 +87,33 @@ pub(crate) struct Signals<'a> {
 }
 
 /// One row per segment.
-pub(crate) fn rows(segments: &[ResolvedSegment], axis: usize, signals: &Signals) -> Vec<SegmentRow> {
-    segments.iter().map(|segment| row(segment, axis, signals)).collect()
+pub(crate) fn rows(
+    segments: &[ResolvedSegment],
+    stretches: &[Stretch],
+    axis: usize,
+    signals: &Signals,
+) -> Vec<SegmentRow> {
+    segments.iter().zip(stretches).map(|(segment, stretch)| row(segment, stretch, axis, signals)).collect()
 }
 
-fn row(segment: &ResolvedSegment, axis: usize, signals: &Signals) -> SegmentRow {
-    let (start, end) = (segment.start_s, segment.end_s);
+fn row(segment: &ResolvedSegment, stretch: &Stretch, axis: usize, signals: &Signals) -> SegmentRow {
+    let Stretch { start, end, course, .. } = *stretch;
     let force_controlled = segment.selection[axis] == 0;
-    let reached = end <= signals.until + 1e-6;
+    let within = |end: f64| end <= signals.until + 1e-6;
+    let reached = within(end) && !matches!(course, Course::CutOff | Course::NotBegun);
+    let begun = reached || course == Course::CutOff;
     let wanted = segment.force[axis];
     let closing = (end - CLOSING_S).max(start);
     let force = signals.force;
     let mean_n = force.mean_of(closing, end, |y| y).filter(|_| reached);
     let deviation = |of: Option<&Series>| {
         let (of, ideal) = (of?, signals.ideal_position?);
-        of.greatest(start, end, |t, y| Some((y - ideal.at(t)?).abs())).filter(|_| reached)
+        // the ideal is not stopped
+        let beside = reached && course == Course::AsPlanned;
+        of.greatest(start, end, |t, y| Some((y - ideal.at(t)?).abs())).filter(|_| beside)
     };
+    let (first, last) = stretch.whole;
+    let extreme = |of: fn(f64) -> f64| force.greatest(first, last, |_, y| Some(of(y))).filter(|_| begun);
     let rms_error = |from: f64| {
         force.mean_of(from, end, |y| (y - wanted) * (y - wanted)).filter(|_| reached && force_controlled).map(f64::sqrt)
     };
@@ -93,6 +125,9 @@ fn row(segment: &ResolvedSegment, axis: usize, signals: &Signals) -> SegmentRow 
         name: segment.name.clone(),
         start_s: start,
         end_s: end,
+        course,
+        planned: within(segment.end_s),
+        whole_s: stretch.whole,
         force_controlled,
         reached,
         commanded_n: force_controlled.then_some(wanted),
@@ -100,9 +135,10 @@ fn row(segment: &ResolvedSegment, axis: usize, signals: &Signals) -> SegmentRow 
         mean_error_n: mean_n.filter(|_| force_controlled).map(|mean| (mean - wanted).abs()),
         rms_error_n: rms_error(closing),
         tracking_error_n: rms_error(start + OPENING_S),
-        least_n: force.greatest(start, end, |_, y| Some(-y)).filter(|_| reached).map(|least| -least),
-        peak_n: force.greatest(start, end, |_, y| Some(y)).filter(|_| reached),
-        rise_s: rise(force, start, end.min(signals.until), wanted, signals.contact).filter(|_| force_controlled),
+        least_n: extreme(|y| -y).map(|least| -least),
+        peak_n: extreme(|y| y),
+        rise_s: rise(force, start, end.min(signals.until), wanted, signals.contact)
+            .filter(|_| force_controlled && course != Course::NotBegun),
         position_error_m: position_error(signals.position),
         encoder_position_error_m: signals.encoder_position.and_then(position_error),
         ideal_position_deviation_m: deviation(Some(signals.position)),

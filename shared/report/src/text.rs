@@ -8,6 +8,7 @@ use crate::faults;
 use crate::ledger::PathLatency;
 use crate::result::{RunReport, Sweep, VariantResult};
 use crate::segments::SegmentRow;
+use crate::stretches::Course;
 use crate::trace::Ended;
 use crate::verdict::{Check, Verdict};
 
@@ -80,8 +81,11 @@ pub(crate) fn segments(rows: &[SegmentRow]) -> Vec<Vec<String>> {
     rows.iter()
         .map(|row| {
             vec![
-                row.name.clone(),
-                format!("{}", row.end_s),
+                match row.course {
+                    Course::AsPlanned => row.name.clone(),
+                    course => format!("{} ({})", row.name, course.words()),
+                },
+                format!("{}", (1e4 * row.end_s).round() / 1e4),
                 number(row.commanded_n, 1),
                 number(row.mean_n, 2),
                 number(row.mean_error_n, 2),

@@ -110,7 +110,7 @@ pub(crate) fn check_relations(limits: &[Limit], variants: &mut [VariantResult]) 
             for segment in segments {
                 let of = |variant: &VariantResult| variant.measure(limit.measure, segment.as_deref());
                 let value = other.and_then(|other| Some(of(own)? / of(&variants[other])?)).filter(|value| value.is_finite());
-                let whole = |variant: &VariantResult| variant.segments.iter().all(|row| row.reached);
+                let whole = |variant: &VariantResult| !variant.segments.iter().any(SegmentRow::is_beyond_the_run);
                 let unjudged = !other.is_some_and(|other| whole(own) && whole(&variants[other]));
                 made.push(check(limit, segment.as_deref(), value, unjudged));
             }
@@ -140,7 +140,7 @@ pub(crate) fn checks(
             continue;
         }
         if !of_segments(limit.measure) {
-            let cut_short = rows.iter().any(|row| !row.reached);
+            let cut_short = rows.iter().any(SegmentRow::is_beyond_the_run);
             checks.push(check(limit, None, run.value(limit.measure, None), cut_short && excused(ended, variant)));
             continue;
         }
@@ -149,7 +149,7 @@ pub(crate) fn checks(
             false => limit.segments.contains(&row.name),
         };
         for row in rows.iter().filter(chosen) {
-            let unjudged = !row.reached && excused(ended, variant);
+            let unjudged = row.is_beyond_the_run() && excused(ended, variant);
             checks.push(check(limit, Some(&row.name), run.value(limit.measure, Some(row)), unjudged));
         }
     }

@@ -97,7 +97,7 @@ fn a_console_that_dies_after_the_task_was_resumed_comes_up_and_sends_the_segment
         &[
             ("segment.1.until_s", Value::Float(6.0)),
             ("safety.acknowledge_s", Value::Float(0.5)),
-            ("process.workstation.boot_ms", Value::Float(50.0)),
+            ("process.workstation.boot_ms", Value::Float(100.0)),
             ("fault", Value::Array(both)),
         ],
     );
@@ -114,8 +114,8 @@ fn the_second_of_two_cards_is_acknowledged_through_the_first() {
     let bench = Bench::new();
     let crash = "fault=[{ target='encoder_if', kind='crash', start_s=2.0, duration_s=0.1 }]";
     let line = ["run", "processor-time", "--variant", "two-68030-customised", "--in-process", "--no-record", "--json"];
-    let changes = ["--set", crash, "--set", "safety.acknowledge_s=0.3", "--set", "segment.1.until_s=3.5"];
-    let length = ["--duration", "6", "--out", "out"];
+    let changes = ["--set", crash, "--set", "safety.acknowledge_s=0.3", "--set", "segment.1.until_s=4"];
+    let length = ["--duration", "7.5", "--out", "out"];
     // cards that do not answer cost the task some releases, of which the scenario allows none
     let outcome = bench.run(&[&line[..], &changes, &length].concat()).expect_code(4).expect_nothing_left();
     let report: Json = serde_json::from_str(&outcome.stdout).expect("JSON");

@@ -64,24 +64,6 @@ fn check_and_show_take_the_keys_that_a_run_would_be_given() {
 }
 
 #[test]
-fn a_task_that_releases_itself_in_no_time_is_refused_with_its_name() {
-    let bench = Bench::new();
-    bench.write("sound.toml", SOUND);
-    // a bus that takes no time, on which the control task looks for an event without a pause
-    let mut set: Vec<String> = ["arbitration_ns", "chain_ns", "address_ns", "handshake_ns", "read_stall_ns"]
-        .map(|key| format!("rack.bus.{key}=0"))
-        .into();
-    set.push("rack.slaves.force-sensor.read_ns=0".into());
-    set.push(
-        "rack.tasks.control.release={ poll = { interrupter = 'force-sample', am = 0x3D, addr = 0x1001DE, width = 'D16', interval_ns = 0 } }"
-            .into(),
-    );
-    let set: Vec<&str> = set.iter().flat_map(|set| ["--set", set]).collect();
-    let line = [&["scenario", "check", "sound.toml"], &set[..]].concat();
-    bench.run(&line).expect_code(2).expect_message("task `control` never ends");
-}
-
-#[test]
 fn an_unknown_key_is_refused() {
     insta::assert_snapshot!(refusal_of("rate_hz = 10000.0", "rate_herz = 10000.0"));
 }

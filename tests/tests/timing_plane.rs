@@ -6,11 +6,14 @@
 use board::{Board, BoardId, Inputs, Mail, Ns, Outputs};
 use messages::registers::force;
 use messages::{AmplifierCommand, BusWord, ControlProbe, PlantSample, TransferRecord};
-use pacing::{Context, Flow, Lockstep, Observer};
+use pacing::{Context, Flow, Lockstep, Observer, RunError};
 use scenario::Scenario;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
-use vme::{Log, MICROSECOND, MILLISECOND, Origin};
+use vme::interrupt::{Interrupter, IrqRelease};
+use vme::rack::{Overrun, Release};
+use vme::timer::Ticks;
+use vme::{Log, MICROSECOND, MILLISECOND, Op, Origin, RackError};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// Period of the force receiver's samples.
@@ -36,6 +39,9 @@ struct Spy {
     note: fn(&Inputs, &mut Outputs, &mut Seen),
 }
 
+/// A board and what is called after each of its steps.
+type Watched = (BoardId, fn(&Inputs, &mut Outputs, &mut Seen));
+
 impl Board for Spy {
     fn step(&mut self, now: Ns, inputs: &Inputs, out: &mut Outputs) {
         self.board.step(now, inputs, out);
@@ -57,7 +63,12 @@ impl Observer for Windows {
 }
 
 /// Runs the scenario for `seconds`, with these spies.
-fn run(scenario: Scenario, seconds: f64, spies: &[(BoardId, fn(&Inputs, &mut Outputs, &mut Seen))]) -> Seen {
+fn run(scenario: Scenario, seconds: f64, spies: &[Watched]) -> Seen {
+    attempt(scenario, seconds, spies).expect("run")
+}
+
+/// The same of a run that may fail.
+fn attempt(scenario: Scenario, seconds: f64, spies: &[Watched]) -> Result<Seen, RunError> {
     let notes = Notes::default();
     let factory = |role: BoardId, context: &Context| -> Result<Box<dyn Board>, String> {
         let board = chassis::boards::build(role, context)?;
@@ -68,9 +79,9 @@ fn run(scenario: Scenario, seconds: f64, spies: &[(BoardId, fn(&Inputs, &mut Out
     };
     let context = Context { prefix: String::new(), variant: "nominal".into(), record: None, measure: false, in_process: true, scenario };
     let mut rack = Lockstep::power_up(context, &factory, &|_| Vec::new(), &INTERRUPTED).expect("power-up");
-    rack.run(scenario::nanoseconds(seconds), &mut Windows(Arc::clone(&notes))).expect("run");
-    rack.finish().expect("end");
-    std::mem::take(&mut *notes.lock().expect("one thread"))
+    rack.run(scenario::nanoseconds(seconds), &mut Windows(Arc::clone(&notes)))?;
+    rack.finish()?;
+    Ok(std::mem::take(&mut *notes.lock().expect("one thread")))
 }
 
 fn table_5_3() -> Scenario {
@@ -189,4 +200,27 @@ fn a_stop_decided_at_t_reaches_the_amplifiers_at_t_plus_its_modelled_path() {
         .find(|transfer| !transfer.is_read() && transfer.job == decided.job && transfer.task == task as u16);
     assert_eq!(write.expect("the stop's first write").data_at, off.t);
     assert_eq!(off.t, decided.t + 20 * MICROSECOND + bus.address_ns + card.write_ns);
+}
+
+#[test]
+fn a_task_that_releases_itself_in_no_time_ends_the_run_with_its_name() {
+    let mut scenario = table_5_3();
+    let task = usize::from(scenario.task_of("control_computer").expect("control task"));
+    let task = &mut scenario.rack.tasks[task];
+    (task.release, task.overrun) = (Release::Interrupt("self".into()), Some(Overrun::Late));
+    let (name, card) = ("control", task.processor.clone());
+    let processor = scenario.rack.processors.iter_mut().find(|processor| processor.name == card).expect("card");
+    processor.interrupt_ns = 0;
+    let ticks = Some(Ticks { period_ns: 5 * MILLISECOND, offset_ns: MILLISECOND });
+    let (status_id, release) = (0x70, IrqRelease::Roak);
+    let own = Interrupter { name: "self".into(), card, level: 3, status_id, release, answer_ns: 350, ticks, local: true };
+    scenario.rack.interrupters.push(own);
+    // a program of the user's own
+    let raises = |_: &Inputs, out: &mut Outputs, _: &mut Seen| {
+        out.programs.iter_mut().for_each(|(_, program)| *program = vec![Op::Raise(3)]);
+    };
+    let error = attempt(scenario, 0.1, &[(BoardId::ControlComputer, raises)]).err().expect("no end");
+    let RunError::Rack(RackError::Endless { task, at_ns, .. }) = &error else { panic!("{error}") };
+    assert_eq!((task.as_str(), *at_ns), (name, MILLISECOND));
+    assert!(chassis::rack_run::is_of_the_scenario(&error), "the command ends with exit code 2");
 }

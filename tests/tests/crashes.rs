@@ -232,8 +232,10 @@ fn a_chassis_that_is_told_to_go_on_but_was_not_stopped_goes_on() {
     for pace in [LOCK_STEP, REAL_TIME] {
         let bench = Bench::new();
         let mut run = start_for(&bench, "2", pace, Duration::ZERO);
+        if pace == REAL_TIME {
+            run.wait_until_it_runs();
+        }
         signal(run.pid(), Signal::CONT);
-        run.pause(Duration::ZERO);
         run.wait().expect_code(0).expect_nothing_left();
     }
 }

@@ -15,6 +15,7 @@ pub mod output;
 pub mod boards;
 pub mod cli;
 pub mod commands;
+mod cost_meter;
 mod machine;
 pub mod parallel;
 pub mod rack_run;

@@ -111,14 +111,6 @@ fn steal() -> Option<(u64, u64)> {
     Some((*times.get(7)?, times.iter().take(8).sum()))
 }
 
-/// Processor time of this process and of its children that have ended, ns.
-pub fn processor_time() -> Option<u64> {
-    let stat = text("/proc/self/stat")?;
-    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    let ticks: u64 = fields.get(11..15)?.iter().filter_map(|time| time.parse::<u64>().ok()).sum();
-    Some(ticks * (1_000_000_000 / rustix::param::clock_ticks_per_second()))
-}
-
 /// Watches load and steal while something is measured.
 pub struct Conditions {
     steal: Option<(u64, u64)>,

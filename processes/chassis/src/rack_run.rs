@@ -1,12 +1,13 @@
 //! One variant of a scenario, from power-up to the last window, and what it comes to.
 
 use crate::boards;
+use crate::cost_meter::CostMeter;
 use crate::status::{self, Shown, Status};
 use board::{Mail, Ns};
 use clap::ValueEnum;
 use messages::{EventKind, Severity, Span, drive_status};
 use pacing::{Context, Flow, Lockstep, Observer, Realtime, RunError};
-use report::latency::{Clock, Journal, Measurement};
+use report::latency::{Clock, Journal, Measurement, MeasuringCost};
 use report::{Accounting, BusAccount, Ended, Ledger, Trace, VariantResult};
 use scenario::{Scenario, Variant};
 use std::path::PathBuf;
@@ -48,12 +49,18 @@ pub struct Setting {
     pub record: Option<PathBuf>,
     /// Measure in simulated time; real time measures anyhow, unless the scenario says otherwise.
     pub measure: bool,
+    /// In real time: measure in every other stretch only, and compare the processor time per so long a cycle, ns.
+    pub cost: Option<Ns>,
+    /// Only what is measured is of interest: what arm and controller did is not kept, however long the run.
+    pub untraced: bool,
 }
 
 /// Longest rehearsal: every usual task has decided by then.
 const REHEARSED: Ns = 1000 * vme::MILLISECOND;
 /// Events of severity error that a watcher sees.
 const FAULTS: usize = 8;
+/// Windows for which the trace has room from the start; a longer run makes more when it needs it.
+const ROOM: f64 = 1e5;
 
 /// What a run came to.
 pub struct Finished {
@@ -69,6 +76,8 @@ pub struct Finished {
     pub windows: Duration,
     /// What was measured, where anything was.
     pub measurement: Option<Measurement>,
+    /// What measuring costs, where that was compared.
+    pub measuring_cost: Option<MeasuringCost>,
 }
 
 /// Runs one variant's scenario to its end, or as far as it goes. `progress` hears the simulated time.
@@ -81,10 +90,12 @@ pub fn run(
 ) -> Result<Finished, String> {
     let start = Instant::now();
     let mut witness = Witness {
-        trace: Trace::with_capacity((scenario.duration() * 250.0) as usize),
+        trace: Trace::default(),
+        untraced: setting.untraced,
         ledger: Ledger::new(scenario),
         accounting: Accounting::new(scenario).map_err(|error| error.to_string())?,
         journal: None,
+        cost: None,
         shown: None,
         status: Status {
             pid: std::process::id(),
@@ -115,8 +126,9 @@ pub fn run(
         result.measured.clone_from(&measurement.rows);
     }
     result.wall_s = Some(windows.as_secs_f64());
-    let Witness { losses, start_up, .. } = witness;
-    Ok(Finished { result, error, losses, start_up, windows, measurement })
+    let Witness { losses, start_up, cost, .. } = witness;
+    let measuring_cost = cost.and_then(CostMeter::finish);
+    Ok(Finished { result, error, losses, start_up, windows, measurement, measuring_cost })
 }
 
 fn carry_out(
@@ -125,7 +137,6 @@ fn carry_out(
     setting: &Setting,
     witness: &mut Witness<'_>,
 ) -> Result<(), RunError> {
-    let scenario = scenario.clone();
     let end = scenario.duration_ns();
     let measure = match setting.pacing {
         Pacing::Lockstep => setting.measure,
@@ -133,11 +144,15 @@ fn carry_out(
     };
     let (variant, record) = (variant.name.clone(), setting.record.clone());
     let in_process = setting.in_process;
-    let context = Context { prefix: String::new(), variant, record, measure, in_process, scenario };
+    let shortest = scenario.rack.tasks.iter().map(|task| task.period_ns).filter(|period| *period > 0).min();
+    let windows = scenario.duration() * 1e9 / shortest.unwrap_or(vme::MILLISECOND) as f64;
+    let room = if setting.untraced { 0 } else { windows.min(ROOM) as usize };
+    let context = Context { prefix: String::new(), variant, record, measure, in_process, scenario: scenario.clone() };
     match setting.pacing {
         Pacing::Lockstep => {
             let mut rack = Lockstep::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
             witness.start_up = witness.start.elapsed();
+            witness.trace.reserve(room);
             witness.journal = measure.then(|| Journal::new(Clock::Simulated, 0));
             witness.shown = rack.folder().map(Shown::new);
             let ran = rack.run(end, witness);
@@ -150,6 +165,9 @@ fn carry_out(
         Pacing::Realtime => {
             let mut rack = Realtime::power_up(context, &boards::build, &boards::program, &INTERRUPTED)?;
             witness.start_up = witness.start.elapsed();
+            // not before memory has been locked: room is touched when it is used
+            witness.trace.reserve(room);
+            witness.cost = setting.cost.map(|cycle| CostMeter::new(scenario, &rack, cycle));
             witness.journal = measure.then(|| Journal::new(Clock::Wall, rack.zero()));
             witness.shown = rack.folder().map(Shown::new);
             let ran = rack.run(end, witness);
@@ -216,9 +234,11 @@ impl Observer for Listener {
 /// Collects what a run is measured by, and ends it when the plant has left its domain.
 struct Witness<'a> {
     trace: Trace,
+    untraced: bool,
     ledger: Ledger,
     accounting: Accounting,
     journal: Option<Journal>,
+    cost: Option<CostMeter>,
     /// Where somebody may watch.
     shown: Option<Shown>,
     status: Status,
@@ -272,7 +292,9 @@ impl Observer for Witness<'_> {
 
     fn window(&mut self, until: Ns, mail: &Mail, log: &Log) -> Flow {
         self.reached = until;
-        self.trace.window(&mail.plant_probe, &mail.control_probe, &mail.events);
+        if !self.untraced {
+            self.trace.window(&mail.plant_probe, &mail.control_probe, &mail.events);
+        }
         let programs = log.transfers.iter().filter(|transfer| transfer.origin == Origin::Program);
         programs.for_each(|transfer| self.ledger.push(transfer));
         for event in mail.events.iter().filter(|event| event.kind == EventKind::RecordLost as u32) {
@@ -280,9 +302,16 @@ impl Observer for Witness<'_> {
             self.losses.push(format!("the record ends at {at_s:.3} s of simulated time: {reason}"));
         }
         self.diverged |= mail.plant_probe.iter().any(|probe| probe.status & drive_status::DIVERGED != 0);
+        if let Some(cost) = &mut self.cost {
+            cost.window(until);
+        }
         (self.progress)(until);
         self.show(until, mail);
         if self.diverged { Flow::Stop } else { Flow::Continue }
+    }
+
+    fn measures(&mut self, from: Ns) -> bool {
+        self.cost.is_none() || CostMeter::measures(from)
     }
 
     fn measured(&mut self, spans: &[Span], lost: u32) {

@@ -34,13 +34,15 @@ pub struct Exchange {
     seen: Vec<u32>,
     /// Boards that are down, as the outlets know them.
     down: u32,
-    /// Messages taken in since they were last asked for, where transport is measured.
-    hops: Option<Vec<Span>>,
+    /// Transport is measured.
+    measured: bool,
+    /// Messages taken in since they were last asked for, where it is.
+    hops: Vec<Span>,
 }
 
 trait Outlet {
-    /// Sends at simulated time `now`; `stamped`: the header says when on the wall clock.
-    fn send(&mut self, now: Ns, mail: &Mail, stamped: bool) -> Result<(), ChannelError>;
+    /// Sends at simulated time `now`, `wall_ns` on the wall clock.
+    fn send(&mut self, now: Ns, mail: &Mail, wall_ns: u64) -> Result<(), ChannelError>;
     /// Messages sent so far.
     fn sent(&self) -> u32;
     /// Messages need not reach these boards, a bit each, and only these.
@@ -146,10 +148,10 @@ impl<T: Payload> TypedOutlet<T> {
 }
 
 impl<T: Payload> Outlet for TypedOutlet<T> {
-    fn send(&mut self, now: Ns, mail: &Mail, stamped: bool) -> Result<(), ChannelError> {
+    fn send(&mut self, now: Ns, mail: &Mail, wall_ns: u64) -> Result<(), ChannelError> {
         for payload in T::of(mail).chunks(LENGTH) {
             let t = if self.sealed { now } else { payload.last().map_or(0, Payload::newest) };
-            let mut header = Header { t, seq: self.seq, crc: 0, wall_ns: if stamped { wall_ns() } else { 0 } };
+            let mut header = Header { t, seq: self.seq, crc: 0, wall_ns };
             if self.sealed {
                 header = Frame::sealed(header, payload).header;
             }
@@ -315,10 +317,10 @@ impl Exchange {
                 self.outlets.iter_mut().for_each(|(_, outlet)| outlet.expect_all_but(down));
             }
         }
-        let stamped = self.hops.is_some();
+        let wall_ns = if self.measured { wall_ns() } else { 0 };
         for (route, outlet) in self.outlets.iter_mut().filter(|(route, _)| ROUTES[*route].from == from) {
             let before = outlet.sent();
-            outlet.send(now, mail, stamped)?;
+            outlet.send(now, mail, wall_ns)?;
             let sent = outlet.sent().wrapping_sub(before);
             if let Some(tally) = self.tally.as_ref().filter(|_| sent > 0) {
                 tally.word(*route).fetch_add(sent, Ordering::SeqCst);
@@ -330,7 +332,8 @@ impl Exchange {
     /// Takes in what other processes sent to `to`, which has acted up to `stepped_to`: where transport is measured, what
     /// is not newer than that has come late.
     pub fn fetch(&mut self, to: BoardId, stepped_to: Ns, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
-        let Self { inlets, hops, tally, seen, tampered, .. } = self;
+        let Self { inlets, measured, hops, tally, seen, tampered, .. } = self;
+        let before = hops.len();
         let inlets = inlets.iter_mut().zip(seen).filter(|((_, inlet), _)| inlet.readers().contains(&to));
         for ((route, inlet), seen) in inlets {
             let carried = tally.as_ref().map_or(0, |tally| tally.word(*route).load(Ordering::SeqCst));
@@ -343,11 +346,10 @@ impl Exchange {
             // a sender that died may have sent one message that it has not counted
             let most = if reborn { u32::MAX } else { news };
             let mut arrived = |header: &Header| {
-                if let Some(hops) = hops {
+                if *measured {
                     hops.push(Span {
                         t: header.t,
                         begin: header.wall_ns,
-                        end: wall_ns(),
                         number: header.seq.into(),
                         channel: *route as u32,
                         // time 0: content whose time only the bus decides
@@ -364,6 +366,10 @@ impl Exchange {
                 Err(ChannelError::Lost { .. }) if reborn => {}
                 received => received?,
             }
+        }
+        if hops.len() > before {
+            let end = wall_ns();
+            hops[before..].iter_mut().for_each(|hop| hop.end = end);
         }
         Ok(())
     }
@@ -390,14 +396,14 @@ impl Exchange {
         Ok(())
     }
 
-    /// From now on messages say when they were sent on the wall clock, and arrivals are measured.
-    pub fn measure(&mut self) {
-        self.hops.get_or_insert_with(|| Vec::with_capacity(BUFFER));
+    /// Whether, from now on, messages say when they were sent on the wall clock, and arrivals are measured.
+    pub fn measure(&mut self, measured: bool) {
+        self.measured = measured;
     }
 
     /// The messages that have come in since this was last asked for.
     pub fn hops(&mut self) -> impl Iterator<Item = Span> {
-        self.hops.iter_mut().flat_map(|hops| hops.drain(..))
+        self.hops.drain(..)
     }
 
     /// How many messages have been sent to other processes, a channel each.
@@ -469,8 +475,8 @@ mod tests {
             let mut a = Exchange::open(&[DaIo], Some(&domain), process_of, &Tampering::default()).expect("open");
             let mut b = Exchange::open(&[HwSim], Some(&domain), process_of, &Tampering::default()).expect("open");
             let mut inboxes = Inboxes::default();
-            a.measure();
-            b.measure();
+            a.measure(true);
+            b.measure(true);
             // the command is of time 7
             for (stepped_to, late, seq) in [(6, 0, 0), (7, 1, 1), (8, 1, 2)] {
                 let before = wall_ns();

@@ -49,6 +49,8 @@ pub mod flags {
     pub const TURN: u32 = 256;
     /// Grant: the chassis is rung, too.
     pub const TELL: u32 = 512;
+    /// Grant: the window is not measured, in a run that otherwise is.
+    pub const UNMEASURED: u32 = 1024;
     /// Reply: the operations that follow, up to the first [`super::OpRecord::of_task`], are the rest of the job; otherwise
     /// the last rest is used again.
     pub const NEW_REST: u32 = 16;

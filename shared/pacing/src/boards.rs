@@ -121,7 +121,7 @@ impl<'f> Boards<'f> {
             Exchange::open(&here, domain.as_ref(), |board| place[board as usize], &tampering(&scenario))?;
         let mut host = Host::new(&here, exchange, &context, factory)?;
         if context.measure {
-            host.measure(false);
+            host.measure();
         }
         let processor = folder.as_ref().and_then(|_| OneProcessor::stay());
         if let Some(folder) = &folder {

@@ -38,8 +38,10 @@ pub struct Host {
     inboxes: Box<Inboxes>,
     inputs: Inputs,
     outputs: Outputs,
-    /// What is measured, where anything is, and whether on the wall clock.
-    measured: Option<(Acts, bool)>,
+    /// What is measured, where anything is.
+    acts: Option<Acts>,
+    /// Whether on the wall clock, and now.
+    timed: bool,
     /// Last window of each board.
     windows: [(Ns, Ns); BOARDS.len()],
 }
@@ -68,7 +70,7 @@ impl Host {
         let (inputs, outputs) = Default::default();
         let clocks = Clocks::new(&context.scenario);
         let windows = [(0, 0); BOARDS.len()];
-        Ok(Host { boards, exchange, clocks, inboxes: Box::default(), inputs, outputs, measured: None, windows })
+        Ok(Host { boards, exchange, clocks, inboxes: Box::default(), inputs, outputs, acts: None, timed: false, windows })
     }
 
     /// Drops these boards as a killed process drops them: nothing is flushed, nothing said.
@@ -107,7 +109,7 @@ impl Host {
     pub(crate) fn fetch(&mut self, board: BoardId, now: Ns, stepped_to: Ns) -> Result<&mut Mail, RunError> {
         self.exchange.fetch(board, stepped_to, &mut self.inboxes)?;
         self.exchange.check(board, now, &mut self.inboxes, &mut self.inputs.defects);
-        if let Some((acts, true)) = &mut self.measured {
+        if let Some(acts) = &mut self.acts {
             for hop in self.exchange.hops() {
                 if ROUTES[hop.channel as usize].kind == Kind::Plant {
                     acts.shown(hop.t, hop.begin);
@@ -118,17 +120,31 @@ impl Host {
         Ok(&mut self.inboxes[board as usize])
     }
 
-    /// From now on what the boards do is measured, on the wall clock or in simulated time alone.
-    pub(crate) fn measure(&mut self, on_the_wall_clock: bool) {
-        self.measured = Some((Acts::default(), on_the_wall_clock));
-        if on_the_wall_clock {
-            self.exchange.measure();
+    /// From now on what the boards do is measured in simulated time.
+    pub(crate) fn measure(&mut self) {
+        self.acts = Some(Acts::default());
+    }
+
+    /// The same on the wall clock, from now on or, not `timed`, from now on no more.
+    pub(crate) fn time(&mut self, timed: bool) {
+        if timed && !self.timed {
+            // what there is belongs to a time before this
+            self.measure();
+        } else if !timed {
+            self.acts = None;
         }
+        self.timed = timed;
+        self.exchange.measure(timed);
+    }
+
+    /// What the wall clock shows, ns, where anything is timed; 0 otherwise.
+    pub(crate) fn clock(&self) -> u64 {
+        if self.timed { wall_ns() } else { 0 }
     }
 
     /// Adds to what has been measured, and takes all of it.
     pub(crate) fn take_spans(&mut self, more: impl IntoIterator<Item = Span>, into: &mut Vec<Span>) {
-        if let Some((acts, _)) = &mut self.measured {
+        if let Some(acts) = &mut self.acts {
             into.append(&mut acts.spans);
             into.extend(more);
         }
@@ -179,8 +195,7 @@ impl Host {
             _ => std::mem::swap(&mut inputs.mail, inbox),
         }
         self.outputs.clear();
-        let clock = |measured: &Option<(Acts, bool)>| if let Some((_, true)) = measured { wall_ns() } else { 0 };
-        let begin = clock(&self.measured);
+        let begin = self.clock();
         if let Some((_, board)) = self.boards.iter_mut().find(|(known, _)| *known == id) {
             board.step(self.clocks.show(id, grant.until), &self.inputs, &mut self.outputs);
         }
@@ -193,8 +208,8 @@ impl Host {
         // an arm that stopped early stands there
         let stands = self.outputs.early.map_or(grant.until, |early| early.clamp(grant.from, grant.until));
         self.windows[id as usize] = (grant.from, stands);
-        let end = clock(&self.measured);
-        if let Some((acts, _)) = &mut self.measured {
+        let end = self.clock();
+        if let Some(acts) = &mut self.acts {
             acts.stepped(id, grant, &self.inputs, &self.outputs, begin, end);
         }
         self.inputs.mail.clear();

@@ -42,6 +42,11 @@ pub trait Observer {
     /// Probes and events of the window's boards, and what happened on the bus and the processors in it.
     fn window(&mut self, until: Ns, mail: &Mail, log: &Log) -> Flow;
 
+    /// Whether what is done in the window from `from` on is measured, in a run in real time that measures; not asked otherwise.
+    fn measures(&mut self, _from: Ns) -> bool {
+        true
+    }
+
     /// What has been measured since the last call, and how many messages of measurements were lost; only called where
     /// [`Context::measure`] asks for it.
     fn measured(&mut self, _spans: &[Span], _lost: u32) {}

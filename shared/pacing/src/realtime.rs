@@ -40,6 +40,8 @@ const HORIZON: Ns = 10 * MILLISECOND;
 const CREDIT: u32 = 64;
 /// No answer for this long in state T: stopped for good. Nobody may wait longer: channels to it would fill up.
 const STOPPED: Duration = Duration::from_millis(100);
+/// The observer gets what was measured this often: a look into a channel costs something, whether or not there is any.
+const SHOW_PERIOD: u64 = 10 * MILLISECOND;
 /// Wall time between the last preparation and simulated time 0.
 const START_UP: u64 = 300 * MILLISECOND;
 
@@ -66,6 +68,10 @@ pub struct Realtime<'f> {
     debts: Vec<Debt>,
     stops: Stops,
     watched: Instant,
+    /// Flag of grants that are not measured.
+    unmeasured: u32,
+    /// When the observer gets what was measured next, on the wall clock.
+    show: u64,
     own_mail: Mail,
 }
 
@@ -102,9 +108,6 @@ impl<'f> Realtime<'f> {
         }
         let stops = Stops::new().map_err(|error| RunError::Refused { what: format!("SIGCONT: {error}") })?;
         let zero = wall_ns() + START_UP;
-        if boards.spans.is_some() {
-            boards.host.measure(true);
-        }
         let start = Grant { from: zero, flags: flags::START, ..boards.grant_of(BoardId::Chassis, 0, 0, 0) };
         for remote in 0..boards.remotes.len() {
             boards.remotes[remote].grant(&start, &[])?;
@@ -123,6 +126,8 @@ impl<'f> Realtime<'f> {
             debts,
             stops,
             watched: Instant::now(),
+            unmeasured: flags::UNMEASURED,
+            show: 0,
             own_mail: Mail::default(),
         })
     }
@@ -192,7 +197,7 @@ impl<'f> Realtime<'f> {
                     };
                     let latest = window.until.saturating_sub(LEAD * self.stage_ns);
                     if self.plan.is_settled() || latest <= clock {
-                        self.tell(window)?;
+                        self.tell(window, observer)?;
                         continue;
                     }
                     next = next.min(self.zero + latest);
@@ -244,7 +249,10 @@ impl<'f> Realtime<'f> {
     }
 
     /// Tells every board its part of a window; the recorder's comes when the window has passed.
-    fn tell(&mut self, draft: Draft) -> Result<(), RunError> {
+    fn tell(&mut self, draft: Draft, observer: &mut dyn Observer) -> Result<(), RunError> {
+        let measured = self.boards.spans.is_some() && observer.measures(draft.from);
+        self.unmeasured = if measured { 0 } else { flags::UNMEASURED };
+        self.boards.host.time(measured);
         self.plan.tell(self.boards.window, &draft);
         self.boards.sort_transfers(&draft.log);
         let Draft { from, until, decision, .. } = draft;
@@ -274,10 +282,11 @@ impl<'f> Realtime<'f> {
         if self.boards.life.is_down(BOARDS[board]) {
             return Ok(());
         }
+        let grant = Grant { flags: grant.flags | self.unmeasured, ..*grant };
         match self.boards.place[board] {
-            None => self.local.push(*grant, &self.boards.transfers[board]),
+            None => self.local.push(grant, &self.boards.transfers[board]),
             Some(remote) => {
-                self.boards.send_grant(remote, grant)?;
+                self.boards.send_grant(remote, &grant)?;
                 let debt = &mut self.debts[remote];
                 if debt.grants == 0 {
                     (debt.since, debt.used) = (Instant::now(), None);
@@ -353,7 +362,11 @@ impl<'f> Realtime<'f> {
             }
             let flow = observer.window(until, mail, &log);
             mail.clear();
-            self.boards.show_spans(observer)?;
+            let now = wall_ns();
+            if self.unmeasured == 0 && self.show <= now {
+                self.show = now + SHOW_PERIOD;
+                self.boards.show_spans(observer)?;
+            }
             if flow == Flow::Stop {
                 return Ok(Flow::Stop);
             }

@@ -63,7 +63,7 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
     bell.rung();
     let mut host = Host::new(&here, exchange, &context, factory)?;
     if context.measure {
-        host.measure(false);
+        host.measure();
     }
     let (mut transfers, mut spans) = (Vec::with_capacity(64), Vec::with_capacity(64));
     line.reply(here[0], READY, &Answer::default())?;
@@ -101,9 +101,6 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
                     // what all processes are refused is the chassis' to tell, once
                     false if own => eprintln!("{name}: real time without {}; the run goes on", refused.join("; ")),
                     _ => {}
-                }
-                if context.measure {
-                    host.measure(true);
                 }
                 line.reply(here[0], grant.window, &Answer::default())?;
                 bells.ring(CHASSIS_BELL);

@@ -18,14 +18,10 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Room for a run of that many windows.
-    pub fn with_capacity(windows: usize) -> Trace {
-        Trace {
-            plant: Vec::with_capacity(windows),
-            control: Vec::with_capacity(windows),
-            events: Vec::with_capacity(64),
-            bus: None,
-        }
+    /// Makes room for so many windows more.
+    pub fn reserve(&mut self, windows: usize) {
+        self.plant.reserve(windows);
+        self.control.reserve(windows);
     }
 
     /// Adds what was heard in one window.

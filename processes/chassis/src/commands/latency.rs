@@ -4,7 +4,7 @@
 //! same cycles in simulated time. Exit code 3 where messages, or measurements of them, were lost or counted twice, 4 where a limit of the scenario (`[[realtime.limit]]`) is violated.
 
 use crate::commands::run::{chosen, end_on_signals};
-use crate::machine::{Conditions, processor_time};
+use crate::machine::Conditions;
 use crate::rack_run::{self, Finished, Pacing, Setting};
 use channels::baseline::{self, Means};
 use clap::Args;
@@ -19,8 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Messages through each of the machine's own means, at the most.
 const BASELINE_MESSAGES: f64 = 1000.0;
-/// Runs with and without measuring that are compared.
-const COST_ROUNDS: usize = 3;
+/// Least length of the run that shows what measuring costs, s: some fifty pairs.
+const COST_S: f64 = 20.0;
 /// Part of a period that a job may compute where `--rate` makes the scenario's time too long.
 const BUSY: f64 = 0.4;
 
@@ -42,7 +42,7 @@ pub struct LatencyArgs {
     /// Refuse to run without a right that the machine refuses.
     #[arg(long)]
     strict: bool,
-    /// Run some times more, with and without measuring, to show what measuring costs.
+    /// Run once more, for 20 s at least, with and without measuring in turn, to show what measuring costs.
     #[arg(long, conflicts_with = "load")]
     cost: bool,
     /// Variant [default: the first].
@@ -71,13 +71,16 @@ pub fn run(args: LatencyArgs) -> miette::Result<u8> {
     end_on_signals()?;
     let hogs = args.load.then(Hogs::start);
     let conditions = Conditions::begin();
-    let (finished, _) = real_time(&variant, &scenario)?;
-    let measured = finished.measurement.ok_or_else(|| miette!("realtime.measure is false: nothing was measured"))?;
-    let rate_hz = 1e9 / control_period(&scenario)? as f64;
+    let cycle_ns = control_period(&scenario)?;
+    let setting = Setting { pacing: Pacing::Realtime, untraced: true, ..Setting::default() };
+    let finished = measured(&variant, &scenario, &setting)?;
+    let measurement = finished.measurement.ok_or_else(|| miette!("realtime.measure is false: nothing was measured"))?;
+    let rate_hz = 1e9 / cycle_ns as f64;
     let baselines = baselines(&scenario, rate_hz, args.seconds)?;
     let machine = conditions.facts();
     drop(hogs);
-    let measuring_cost = if args.cost { cost(&variant, &scenario, rate_hz)? } else { None };
+    let cost = Setting { cost: Some(cycle_ns), ..setting };
+    let measuring_cost = if args.cost { Some(cost_of_measuring(&variant, &scenario, &cost)?) } else { None };
     let modelled = simulated_time(&variant, &scenario)?;
     let mut report = LatencyReport {
         schema_version: 0,
@@ -88,7 +91,7 @@ pub fn run(args: LatencyArgs) -> miette::Result<u8> {
         verdict: Verdict::Passed,
         limits: Vec::new(),
         baselines,
-        measured,
+        measured: measurement,
         modelled: modelled.measurement.ok_or_else(|| miette!("nothing was measured in simulated time"))?,
         modelled_transfers: modelled.result.transfers,
         measuring_cost,
@@ -137,40 +140,23 @@ fn control_period(scenario: &Scenario) -> miette::Result<u64> {
     period.ok_or_else(|| miette!("the control task has no period of its own: give it one, rack.tasks.control.period_ns"))
 }
 
-fn finished(finished: Result<Finished, String>) -> miette::Result<Finished> {
-    let finished = finished.map_err(|reason| miette!("{reason}"))?;
+fn measured(variant: &Variant, scenario: &Scenario, setting: &Setting) -> miette::Result<Finished> {
+    let finished = rack_run::run(scenario, variant, setting, &mut |_| {}).map_err(|reason| miette!("{reason}"))?;
     match finished.error {
         Some(error) => Err(miette!("{error}")),
         None => Ok(finished),
     }
 }
 
-/// A run on the wall clock, and the processor time that it took, ns.
-fn real_time(variant: &Variant, scenario: &Scenario) -> miette::Result<(Finished, u64)> {
-    let before = processor_time().unwrap_or(0);
-    let setting = Setting { pacing: Pacing::Realtime, ..Setting::default() };
-    let run = finished(rack_run::run(scenario, variant, &setting, &mut |_| {}))?;
-    Ok((run, processor_time().unwrap_or(0) - before))
-}
-
 fn simulated_time(variant: &Variant, scenario: &Scenario) -> miette::Result<Finished> {
-    let setting = Setting { in_process: true, measure: true, ..Setting::default() };
-    finished(rack_run::run(scenario, variant, &setting, &mut |_| {}))
+    measured(variant, scenario, &Setting { in_process: true, measure: true, untraced: true, ..Setting::default() })
 }
 
-/// The same run with and without measuring, in turn; of each the least, since others disturb only upwards.
-fn cost(variant: &Variant, scenario: &Scenario, rate_hz: f64) -> miette::Result<Option<MeasuringCost>> {
-    let mut least = [u64::MAX; 2];
-    for _ in 0..COST_ROUNDS {
-        for (least, measure) in least.iter_mut().zip([true, false]) {
-            let realtime = scenario::Realtime { measure, ..scenario.realtime.clone() };
-            let (_, busy) = real_time(variant, &Scenario { realtime, ..scenario.clone() })?;
-            *least = busy.min(*least);
-        }
-    }
-    let cycles = scenario.duration() * rate_hz;
-    let [with_ns, without_ns] = least.map(|busy| busy as f64 / cycles);
-    Ok(Some(MeasuringCost { with_ns, without_ns, of_period: (with_ns - without_ns) * rate_hz * 1e-9 }))
+/// A run in which stretches with and without measuring take turns.
+fn cost_of_measuring(variant: &Variant, scenario: &Scenario, setting: &Setting) -> miette::Result<MeasuringCost> {
+    let duration_s = Some(scenario.duration().max(COST_S));
+    let run = measured(variant, &Scenario { duration_s, ..scenario.clone() }, setting)?;
+    run.measuring_cost.ok_or_else(|| miette!("the run ended before it could show what measuring costs"))
 }
 
 /// The machine's own means, one after the other.

@@ -87,7 +87,8 @@ pub fn run(args: RunArgs) -> miette::Result<u8> {
             // of a run before in the same folder
             settled_record::parts(record).skip(1).try_for_each(std::fs::remove_file).into_diagnostic()?;
         }
-        let setting = Setting { pacing: args.pacing, in_process: args.in_process, record: record.clone(), measure: false };
+        let (pacing, in_process) = (args.pacing, args.in_process);
+        let setting = Setting { pacing, in_process, record: record.clone(), ..Setting::default() };
         let finished = run_with_progress(scenario, variant, &setting)?;
         let mut result = finished.result;
         if let Some(error) = &finished.error {

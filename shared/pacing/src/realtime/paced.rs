@@ -8,8 +8,7 @@ use super::writes::Writes;
 use crate::RunError;
 use crate::host::{Answer, Host};
 use board::BoardId;
-use channels::wall_ns;
-use messages::{BOARDS, Grant, Span, SpanKind, TransferRecord};
+use messages::{BOARDS, Grant, Span, SpanKind, TransferRecord, flags};
 use scenario::Scenario;
 use std::collections::VecDeque;
 use vme::Ns;
@@ -95,7 +94,8 @@ impl Paced {
         let Some(Waiting { due, mut grant, transfers }) = self.queue.pop_front() else { return Ok(None) };
         let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
         let pace = &mut self.boards[board as usize];
-        let began = wall_ns();
+        host.time(grant.flags & flags::UNMEASURED == 0);
+        let began = host.clock();
         let mail = host.fetch(board, grant.until, pace.stepped_to)?;
         // answers to an earlier job that come with those of the next must not count as the newest
         mail.words.sort_unstable_by_key(|word| (word.job, word.task, word.index));
@@ -114,7 +114,7 @@ impl Paced {
             t: grant.until,
             due,
             begin: began,
-            end: wall_ns(),
+            end: host.clock(),
             window: grant.window,
             late: (began.saturating_sub(due) > self.stage_ns).into(),
             overwritten,

@@ -4,8 +4,9 @@
 //! (no coordinated omission).
 
 use super::cycle::{Clock, Cycle, PARTS, Stamps, WHOLE};
-use super::row::{LatencyRow, Recorder};
+use super::row::{LatencyRow, Recorder, histogram};
 use board::routes::ROUTES;
+use hdrhistogram::Histogram;
 use messages::{BOARDS, BoardId, Span, SpanKind};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
@@ -68,13 +69,17 @@ pub struct Journal {
     clock: Clock,
     zero: u64,
     boards: [Option<Steps>; BOARDS.len()],
-    hops: BTreeMap<(u32, u32), Hops>,
+    /// By route, then reader.
+    hops: Vec<Option<Hops>>,
     sent: BTreeMap<u32, u64>,
     age: Recorder,
     parts: [Recorder; 3],
     whole: Recorder,
     open: BTreeMap<u64, Stamps>,
-    steps: VecDeque<Span>,
+    steps: VecDeque<Step>,
+    /// Row to settle next, and what it needs for it: one at a time, so that nobody waits for all.
+    turn: usize,
+    of_second: Histogram<u64>,
     measurement: Measurement,
 }
 
@@ -82,7 +87,18 @@ struct Steps {
     wake_up: Recorder,
     execution: Recorder,
     jitter: Recorder,
-    last: Option<Span>,
+    /// When the last one was intended, and when it began.
+    last: Option<(u64, u64)>,
+}
+
+/// What the notes of long cycles need of a step.
+#[derive(Clone, Copy)]
+struct Step {
+    window: u64,
+    due: u64,
+    begin: u64,
+    end: u64,
+    board: u32,
 }
 
 struct Hops {
@@ -110,13 +126,15 @@ impl Journal {
             clock,
             zero,
             boards: Default::default(),
-            hops: BTreeMap::new(),
+            hops: (0..ROUTES.len() * BOARDS.len()).map(|_| None).collect(),
             sent: BTreeMap::new(),
             age: Recorder::new("age of the force value when used"),
             parts: PARTS.map(Recorder::new),
             whole: Recorder::counting_misses(WHOLE),
             open: BTreeMap::new(),
             steps: VecDeque::with_capacity(REMEMBERED),
+            turn: 0,
+            of_second: histogram(),
             measurement: Measurement {
                 rows: Vec::new(),
                 cycles: 0,
@@ -151,6 +169,21 @@ impl Journal {
                 None => {}
             }
         }
+        self.settle_one();
+    }
+
+    fn settle_one(&mut self) {
+        let boards = self.boards.iter_mut().flatten();
+        let steps = boards.flat_map(|steps| [&mut steps.wake_up, &mut steps.execution, &mut steps.jitter]);
+        let hops = self.hops.iter_mut().flatten().map(|hops| &mut hops.latency);
+        let cycles = self.parts.iter_mut().chain([&mut self.age, &mut self.whole]);
+        match steps.chain(hops).chain(cycles).nth(self.turn) {
+            Some(row) => {
+                row.settle(&mut self.of_second);
+                self.turn += 1;
+            }
+            None => self.turn = 0,
+        }
     }
 
     fn step(&mut self, span: &Span) {
@@ -172,18 +205,22 @@ impl Journal {
             steps.wake_up.miss();
         }
         steps.execution.record(at, span.end.saturating_sub(span.begin));
-        if let Some(last) = steps.last.replace(*span) {
-            let (intended, actual) = (span.due.abs_diff(last.due), span.begin.abs_diff(last.begin));
+        if let Some((due, begin)) = steps.last.replace((span.due, span.begin)) {
+            let (intended, actual) = (span.due.abs_diff(due), span.begin.abs_diff(begin));
             steps.jitter.record(at, actual.abs_diff(intended));
         }
         if self.steps.len() == REMEMBERED {
             self.steps.pop_front();
         }
-        self.steps.push_back(*span);
+        let Span { window, due, begin, end, board, .. } = *span;
+        self.steps.push_back(Step { window, due, begin, end, board });
     }
 
     fn hop(&mut self, span: &Span) {
-        let hops = self.hops.entry((span.channel, span.board)).or_insert_with(|| {
+        let (channel, reader) = (span.channel as usize, span.board as usize);
+        let known = channel < ROUTES.len() && reader < BOARDS.len();
+        let Some(hops) = known.then(|| &mut self.hops[channel * BOARDS.len() + reader]) else { return };
+        let hops = hops.get_or_insert_with(|| {
             let (channel, reader) = (channel_name(span.channel), board_name(span.board).to_owned());
             Hops {
                 latency: Recorder::counting_misses(format!("{channel} to {reader}")),
@@ -255,7 +292,7 @@ impl Journal {
     /// Rows so far: path, values, median and greatest, ns, and misses.
     pub fn rows(&self) -> impl Iterator<Item = &Recorder> {
         let boards = self.boards.iter().flatten().flat_map(|steps| [&steps.wake_up, &steps.execution, &steps.jitter]);
-        let hops = self.hops.values().map(|hops| &hops.latency);
+        let hops = self.hops.iter().flatten().map(|hops| &hops.latency);
         let cycles = [&self.age].into_iter().chain(&self.parts).chain([&self.whole]);
         boards.chain(hops).chain(cycles)
     }
@@ -267,7 +304,9 @@ impl Journal {
         for steps in self.boards.into_iter().flatten() {
             rows.extend([steps.wake_up, steps.execution, steps.jitter].map(Recorder::finish));
         }
-        for ((channel, _), mut hops) in self.hops {
+        for (i, hops) in self.hops.into_iter().enumerate() {
+            let Some(mut hops) = hops else { continue };
+            let channel = (i / BOARDS.len()) as u32;
             // a run that broke off did not tell how many were sent; messages of the boot do not count
             hops.count.sent = self.sent.get(&channel).copied().unwrap_or(hops.next) - hops.first;
             rows.push(hops.latency.finish());
@@ -289,7 +328,7 @@ impl Measurement {
 }
 
 /// What stood out among the steps of these windows.
-fn notes(steps: &VecDeque<Span>, windows: std::ops::RangeInclusive<u64>) -> Vec<String> {
+fn notes(steps: &VecDeque<Step>, windows: std::ops::RangeInclusive<u64>) -> Vec<String> {
     let mut found: Vec<(u64, String)> = Vec::new();
     for step in steps.iter().filter(|step| windows.contains(&step.window)) {
         let name = board_name(step.board);

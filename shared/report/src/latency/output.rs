@@ -1,6 +1,7 @@
 //! The report of a latency measurement and its files: `latency.json`, `latency.html`, the interval log `latency.hlog`, and
 //! `latency.hist` as cyclictest writes its histograms.
 
+use super::cost::{CostRow, MeasuringCost};
 use super::journal::Measurement;
 use super::row::LatencyRow;
 use crate::html::{escape, fill, table as html_table};
@@ -27,6 +28,8 @@ const CYCLE_HEADINGS: [&str; 7] = [
     "whole µs",
     "what happened",
 ];
+const COST_HEADINGS: [&str; 7] =
+    ["process", "with µs", "without µs", "difference µs", "95 % from µs", "to µs", "mean difference µs"];
 const LIMIT_HEADINGS: [&str; 5] = ["path", "quantile", "value µs", "limit", ""];
 
 /// One limit of the scenario, judged.
@@ -42,17 +45,6 @@ pub struct LatencyCheck {
     pub max_us: f64,
     /// Whether it holds.
     pub passed: bool,
-}
-
-/// Processor time of the rack's processes, measuring and not measuring.
-#[derive(Clone, Debug, Serialize)]
-pub struct MeasuringCost {
-    /// Per control cycle with measuring, ns.
-    pub with_ns: f64,
-    /// Per control cycle without, ns.
-    pub without_ns: f64,
-    /// The difference as part of a cycle's period.
-    pub of_period: f64,
 }
 
 /// A measurement with everything that it must be read with.
@@ -127,6 +119,9 @@ impl LatencyReport {
                 table(&LATENCY_HEADINGS, &latency_rows(&self.modelled_transfers)),
             ),
         ];
+        if let Some(cost) = &self.measuring_cost {
+            tables.push(("processor time of a cycle, measuring and not", table(&COST_HEADINGS, &costs(cost))));
+        }
         if !self.limits.is_empty() {
             tables.push(("limits", table(&LIMIT_HEADINGS, &self.checks())));
         }
@@ -170,14 +165,7 @@ impl LatencyReport {
             ),
             format!("messages of measurements lost {}", m.unmeasured),
         ];
-        if let Some(cost) = &self.measuring_cost {
-            remarks.push(format!(
-                "measuring: {:.1} µs of processor time a cycle with it, {:.1} µs without, {:.2} % of the period",
-                cost.with_ns * 1e-3,
-                cost.without_ns * 1e-3,
-                cost.of_period * 100.0
-            ));
-        }
+        remarks.extend(self.measuring_cost.as_ref().map(MeasuringCost::remark));
         remarks
     }
 
@@ -304,6 +292,15 @@ pub fn text(of: &[LatencyRow]) -> String {
 /// The same as a table of a page.
 pub(crate) fn html(of: &[LatencyRow]) -> String {
     html_table(&HEADINGS[..10], &rows(of).into_iter().map(|row| row[..10].to_vec()).collect::<Vec<_>>())
+}
+
+fn costs(cost: &MeasuringCost) -> Vec<Vec<String>> {
+    let row = |row: &CostRow| {
+        let [low, high] = row.interval_ns;
+        let times = [row.with_ns, row.without_ns, row.difference_ns, low, high, row.mean_ns];
+        [vec![row.process.clone()], times.map(|ns| format!("{:.2}", ns * 1e-3)).to_vec()].concat()
+    };
+    cost.rows().map(row).collect()
 }
 
 fn cycles(measured: &Measurement) -> Vec<Vec<String>> {

@@ -1,9 +1,13 @@
 //! One row of the table of latencies: a histogram over the whole run, and one of each second for the interval log.
+//!
+//! Values wait until their second is over and then go into the histograms together: a bucket apiece, far apart in memory,
+//! would cost several times as much. So does a row keep no more than the values of two seconds.
 
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2Serializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
 use serde::Serialize;
+use std::collections::VecDeque;
 use std::time::Duration;
 
 /// Longest latency that is told apart, ns; longer ones count as this.
@@ -45,15 +49,19 @@ pub struct LatencyRow {
 /// A row under way.
 pub struct Recorder {
     path: String,
-    values: Histogram<u64>,
+    n: u64,
     /// How often it came too late or not at all.
     pub missed: Option<u64>,
-    second: u64,
-    of_second: Histogram<u64>,
+    /// Values of the seconds that have been settled.
+    values: Histogram<u64>,
+    /// Values of those that have not, in the order of time.
+    unsettled: VecDeque<(u64, Vec<u64>)>,
+    spare: Vec<u64>,
     log: Vec<(u64, String)>,
 }
 
-fn histogram() -> Histogram<u64> {
+/// An empty histogram, as every row has one.
+pub(super) fn histogram() -> Histogram<u64> {
     // bounds and digits are valid constants
     Histogram::new_with_bounds(1, LONGEST_NS, 3).unwrap_or_else(|_| unreachable!())
 }
@@ -61,8 +69,15 @@ fn histogram() -> Histogram<u64> {
 impl Recorder {
     /// An empty row.
     pub fn new(path: impl Into<String>) -> Recorder {
-        let (values, of_second) = (histogram(), histogram());
-        Recorder { path: path.into(), values, missed: None, second: 0, of_second, log: Vec::new() }
+        Recorder {
+            path: path.into(),
+            n: 0,
+            missed: None,
+            values: histogram(),
+            unsettled: VecDeque::with_capacity(2),
+            spare: Vec::new(),
+            log: Vec::new(),
+        }
     }
 
     /// An empty row in which values can be missed.
@@ -72,13 +87,16 @@ impl Recorder {
 
     /// One value, taken at `at` ns after the start of the run.
     pub fn record(&mut self, at: u64, ns: u64) {
+        self.n += 1;
         let second = at / SECOND;
-        if second != self.second {
-            self.close_second();
-            self.second = second;
+        match self.unsettled.back_mut() {
+            Some((last, values)) if second <= *last => values.push(ns),
+            _ => {
+                let mut values = std::mem::take(&mut self.spare);
+                values.push(ns);
+                self.unsettled.push_back((second, values));
+            }
         }
-        self.values.saturating_record(ns.max(1));
-        self.of_second.saturating_record(ns.max(1));
     }
 
     /// One value too late, or none where one was due.
@@ -93,40 +111,56 @@ impl Recorder {
 
     /// How many values there are.
     pub fn n(&self) -> u64 {
-        self.values.len()
+        self.n
     }
 
-    /// Values so far, at this quantile, ns.
+    /// Values of the seconds settled so far, at this quantile, ns.
     pub fn quantile(&self, quantile: f64) -> u64 {
         self.values.value_at_quantile(quantile)
     }
 
-    fn close_second(&mut self) {
-        if self.of_second.is_empty() {
-            return;
+    /// Counts the values of every second but the last one; `of_second` is an empty [`histogram`], and is so afterwards.
+    pub(super) fn settle(&mut self, of_second: &mut Histogram<u64>) {
+        while self.unsettled.len() > 1 {
+            self.settle_first(of_second);
         }
+    }
+
+    fn settle_first(&mut self, of_second: &mut Histogram<u64>) {
+        let Some((second, mut values)) = self.unsettled.pop_front() else { return };
+        for ns in &values {
+            self.values.saturating_record((*ns).max(1));
+            of_second.saturating_record((*ns).max(1));
+        }
+        self.log.extend(self.interval(second, of_second).map(|line| (second, line)));
+        of_second.reset();
+        values.clear();
+        self.spare = values;
+    }
+
+    /// The line of the interval log; writing into memory does not fail.
+    fn interval(&self, second: u64, of_second: &Histogram<u64>) -> Option<String> {
         let tag = self.path.replace([' ', ','], "_");
         let (mut line, mut serializer) = (Vec::new(), V2Serializer::new());
-        let begun =
-            IntervalLogWriterBuilder::new().with_max_value_divisor(1e6).begin_log_with(&mut line, &mut serializer);
-        let written = begun.map(|mut log| {
-            let start = Duration::from_secs(self.second);
-            log.write_histogram(&self.of_second, start, Duration::from_secs(1), Tag::new(&tag))
-        });
-        // writing into memory does not fail
-        if let (Ok(Ok(())), Ok(text)) = (written, String::from_utf8(line)) {
-            let line = text.lines().filter(|line| !line.starts_with('#')).collect();
-            self.log.push((self.second, line));
-        }
-        self.of_second.reset();
+        IntervalLogWriterBuilder::new()
+            .with_max_value_divisor(1e6)
+            .begin_log_with(&mut line, &mut serializer)
+            .ok()?
+            .write_histogram(of_second, Duration::from_secs(second), Duration::from_secs(1), Tag::new(&tag))
+            .ok()?;
+        let text = String::from_utf8(line).ok()?;
+        Some(text.lines().filter(|line| !line.starts_with('#')).collect())
     }
 
     /// The finished row.
     pub fn finish(mut self) -> LatencyRow {
-        self.close_second();
+        let mut of_second = histogram();
+        while !self.unsettled.is_empty() {
+            self.settle_first(&mut of_second);
+        }
         let at = |quantile| self.values.value_at_quantile(quantile);
         LatencyRow {
-            n: self.values.len(),
+            n: self.n,
             min_ns: self.values.min(),
             p50_ns: at(0.5),
             p90_ns: at(0.9),
@@ -185,6 +219,19 @@ mod tests {
         }
         assert_eq!(row.quantile(0.99), row.p99_ns);
         assert_eq!(row.histogram.iter().map(|(_, count)| count).sum::<u64>(), 1000);
+    }
+
+    #[test]
+    fn a_row_keeps_no_values_of_a_second_that_is_settled() {
+        let (mut recorder, mut of_second) = (Recorder::new("step hw_sim"), histogram());
+        for i in 0..100_000 {
+            recorder.record(i * 1_000_000, i % 1000);
+            recorder.settle(&mut of_second);
+            assert!(of_second.is_empty() && recorder.unsettled.len() == 1);
+        }
+        assert!(recorder.unsettled[0].1.capacity() + recorder.spare.capacity() < 4096);
+        assert_eq!((recorder.n(), recorder.log.len(), recorder.quantile(1.0)), (100_000, 99, 999));
+        assert_eq!(recorder.finish().histogram.iter().map(|(_, count)| count).sum::<u64>(), 100_000);
     }
 
     #[test]

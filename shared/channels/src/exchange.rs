@@ -34,10 +34,8 @@ pub struct Exchange {
     seen: Vec<u32>,
     /// Boards that are down, as the outlets know them.
     down: u32,
-    /// Transport is measured.
-    measured: bool,
-    /// Messages taken in since they were last asked for, where it is.
-    hops: Vec<Span>,
+    /// Messages say when they were sent on the wall clock.
+    stamped: bool,
 }
 
 trait Outlet {
@@ -317,7 +315,7 @@ impl Exchange {
                 self.outlets.iter_mut().for_each(|(_, outlet)| outlet.expect_all_but(down));
             }
         }
-        let wall_ns = if self.measured { wall_ns() } else { 0 };
+        let wall_ns = if self.stamped { wall_ns() } else { 0 };
         for (route, outlet) in self.outlets.iter_mut().filter(|(route, _)| ROUTES[*route].from == from) {
             let before = outlet.sent();
             outlet.send(now, mail, wall_ns)?;
@@ -329,11 +327,17 @@ impl Exchange {
         Ok(())
     }
 
-    /// Takes in what other processes sent to `to`, which has acted up to `stepped_to`: where transport is measured, what
-    /// is not newer than that has come late.
-    pub fn fetch(&mut self, to: BoardId, stepped_to: Ns, inboxes: &mut Inboxes) -> Result<(), ChannelError> {
-        let Self { inlets, measured, hops, tally, seen, tampered, .. } = self;
-        let before = hops.len();
+    /// Takes in what other processes sent to `to`, which has acted up to `stepped_to`. Where transport is measured, `hops`
+    /// gets each message; what is not newer than `stepped_to` has come late.
+    pub fn fetch(
+        &mut self,
+        to: BoardId,
+        stepped_to: Ns,
+        inboxes: &mut Inboxes,
+        mut hops: Option<&mut Vec<Span>>,
+    ) -> Result<(), ChannelError> {
+        let Self { inlets, tally, seen, tampered, .. } = self;
+        let before = hops.as_ref().map_or(0, |hops| hops.len());
         let inlets = inlets.iter_mut().zip(seen).filter(|((_, inlet), _)| inlet.readers().contains(&to));
         for ((route, inlet), seen) in inlets {
             let carried = tally.as_ref().map_or(0, |tally| tally.word(*route).load(Ordering::SeqCst));
@@ -346,7 +350,7 @@ impl Exchange {
             // a sender that died may have sent one message that it has not counted
             let most = if reborn { u32::MAX } else { news };
             let mut arrived = |header: &Header| {
-                if *measured {
+                if let Some(hops) = &mut hops {
                     hops.push(Span {
                         t: header.t,
                         begin: header.wall_ns,
@@ -367,7 +371,7 @@ impl Exchange {
                 received => received?,
             }
         }
-        if hops.len() > before {
+        if let Some(hops) = hops.filter(|hops| hops.len() > before) {
             let end = wall_ns();
             hops[before..].iter_mut().for_each(|hop| hop.end = end);
         }
@@ -396,14 +400,9 @@ impl Exchange {
         Ok(())
     }
 
-    /// Whether, from now on, messages say when they were sent on the wall clock, and arrivals are measured.
-    pub fn measure(&mut self, measured: bool) {
-        self.measured = measured;
-    }
-
-    /// The messages that have come in since this was last asked for.
-    pub fn hops(&mut self) -> impl Iterator<Item = Span> {
-        self.hops.drain(..)
+    /// Whether messages say from now on when they were sent on the wall clock.
+    pub fn stamp(&mut self, stamped: bool) {
+        self.stamped = stamped;
     }
 
     /// How many messages have been sent to other processes, a channel each.
@@ -450,14 +449,15 @@ mod tests {
             let mut b = Exchange::open(&here, Some(&other), process_of, &Tampering::default()).expect("open");
             let (mut at_a, mut at_b) = (Inboxes::default(), Inboxes::default());
             a.deliver(DaIo, 9, &mail_with_command(), &mut at_a).expect("deliver");
-            b.fetch(HwSim, 0, &mut at_b).expect("fetch");
+            let mut hops = Vec::new();
+            b.fetch(HwSim, 0, &mut at_b, Some(&mut hops)).expect("fetch");
             assert_eq!(at_b[HwSim as usize].amplifier, mail_with_command().amplifier);
-            assert_eq!(b.hops().count(), 0, "nothing is measured unasked");
+            assert_eq!((hops.len(), hops[0].begin), (1, 0), "no message is stamped unasked");
             let mut mail = Mail::default();
             // one message more than fits a sample's preallocated length
             mail.plant.resize(LENGTH + 1, bytemuck::Zeroable::zeroed());
             b.deliver(HwSim, 9, &mail, &mut at_b).expect("deliver");
-            a.fetch(EncoderIf, 0, &mut at_a).expect("fetch");
+            a.fetch(EncoderIf, 0, &mut at_a, None).expect("fetch");
             assert_eq!(at_a[EncoderIf as usize].plant.len(), LENGTH + 1);
             assert_eq!(at_a[DaIo as usize].plant.len(), LENGTH + 1);
             assert_eq!(at_b[ForceSensorIf as usize].plant.len(), LENGTH + 1);
@@ -475,14 +475,13 @@ mod tests {
             let mut a = Exchange::open(&[DaIo], Some(&domain), process_of, &Tampering::default()).expect("open");
             let mut b = Exchange::open(&[HwSim], Some(&domain), process_of, &Tampering::default()).expect("open");
             let mut inboxes = Inboxes::default();
-            a.measure(true);
-            b.measure(true);
+            a.stamp(true);
             // the command is of time 7
             for (stepped_to, late, seq) in [(6, 0, 0), (7, 1, 1), (8, 1, 2)] {
                 let before = wall_ns();
                 a.deliver(DaIo, 9, &mail_with_command(), &mut inboxes).expect("deliver");
-                b.fetch(HwSim, stepped_to, &mut inboxes).expect("fetch");
-                let hops: Vec<Span> = b.hops().collect();
+                let mut hops = Vec::new();
+                b.fetch(HwSim, stepped_to, &mut inboxes, Some(&mut hops)).expect("fetch");
                 assert_eq!(hops.len(), 1);
                 assert_eq!((hops[0].late, hops[0].number, hops[0].t), (late, seq, 7));
                 assert!(before <= hops[0].begin && hops[0].begin <= hops[0].end);

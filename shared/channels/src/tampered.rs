@@ -93,7 +93,7 @@ mod tests {
             here.deliver(BoardId::EncoderIf, now, &mail, &mut at_a).expect("deliver");
             match there {
                 Some(there) => {
-                    there.fetch(to, 0, &mut at_b).expect("fetch");
+                    there.fetch(to, 0, &mut at_b, None).expect("fetch");
                     there.check(to, now, &mut at_b, &mut defects);
                 }
                 None => here.check(to, now, &mut at_b, &mut defects),

@@ -3,8 +3,9 @@
 //!
 //! Only for measuring: without it a host keeps none of this. In simulated time the wall stamps are 0.
 
+use board::routes::ROUTES;
 use board::{BoardId, Inputs, Ns, Outputs};
-use messages::{Grant, Span, SpanKind};
+use messages::{Grant, Kind, Span, SpanKind};
 use std::collections::VecDeque;
 
 /// Messages of the arm that a reading may still go back to.
@@ -22,8 +23,18 @@ pub(crate) struct Acts {
 }
 
 impl Acts {
+    /// The spans from that one on are of messages that have just come.
+    pub fn came(&mut self, first: usize) {
+        for i in first..self.spans.len() {
+            let hop = self.spans[i];
+            if ROUTES[hop.channel as usize].kind == Kind::Plant {
+                self.shown(hop.t, hop.begin);
+            }
+        }
+    }
+
     /// The arm has sent its samples up to `t`.
-    pub fn shown(&mut self, t: Ns, sent: u64) {
+    fn shown(&mut self, t: Ns, sent: u64) {
         if self.shown.len() == KEPT {
             self.shown.pop_front();
         }

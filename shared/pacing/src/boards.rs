@@ -189,7 +189,7 @@ impl<'f> Boards<'f> {
     /// Shows the observer what has been measured.
     pub fn show_spans(&mut self, observer: &mut dyn Observer) -> Result<(), RunError> {
         let Some(spans) = &mut self.spans else { return Ok(()) };
-        self.host.take_spans([], spans);
+        spans.extend(self.host.spans().into_iter().flat_map(|spans| spans.drain(..)));
         let mut lost = 0;
         for remote in &mut self.remotes {
             lost += remote.spans(spans)?;

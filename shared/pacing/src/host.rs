@@ -4,10 +4,9 @@ use crate::acts::Acts;
 use crate::faults::Clocks;
 use crate::holdback::{take_before, take_until};
 use crate::{Context, RunError};
-use board::routes::ROUTES;
 use board::{Board, BoardId, Decision, Inputs, Mail, Ns, Op, Outputs};
 use channels::{Exchange, Inboxes, wall_ns};
-use messages::{BOARDS, Grant, Kind, Span, TransferRecord, flags};
+use messages::{BOARDS, Grant, Span, TransferRecord, flags};
 
 /// Builds the board of that role.
 pub type Factory<'a> = &'a dyn Fn(BoardId, &Context) -> Result<Box<dyn Board>, String>;
@@ -40,8 +39,10 @@ pub struct Host {
     outputs: Outputs,
     /// What is measured, where anything is.
     acts: Option<Acts>,
-    /// Whether on the wall clock, and now.
+    /// Whether on the wall clock, and now; then, when the last step began and ended there.
     timed: bool,
+    began: u64,
+    ended: u64,
     /// Last window of each board.
     windows: [(Ns, Ns); BOARDS.len()],
 }
@@ -70,7 +71,7 @@ impl Host {
         let (inputs, outputs) = Default::default();
         let clocks = Clocks::new(&context.scenario);
         let windows = [(0, 0); BOARDS.len()];
-        Ok(Host { boards, exchange, clocks, inboxes: Box::default(), inputs, outputs, acts: None, timed: false, windows })
+        Ok(Host { boards, exchange, clocks, inboxes: Box::default(), inputs, outputs, acts: None, timed: false, began: 0, ended: 0, windows })
     }
 
     /// Drops these boards as a killed process drops them: nothing is flushed, nothing said.
@@ -107,16 +108,15 @@ impl Host {
 
     /// Takes in the mail that a board that has acted up to `stepped_to` has at `now`.
     pub(crate) fn fetch(&mut self, board: BoardId, now: Ns, stepped_to: Ns) -> Result<&mut Mail, RunError> {
-        self.exchange.fetch(board, stepped_to, &mut self.inboxes)?;
-        self.exchange.check(board, now, &mut self.inboxes, &mut self.inputs.defects);
-        if let Some(acts) = &mut self.acts {
-            for hop in self.exchange.hops() {
-                if ROUTES[hop.channel as usize].kind == Kind::Plant {
-                    acts.shown(hop.t, hop.begin);
-                }
-                acts.spans.push(hop);
-            }
+        self.began = self.clock();
+        let mut acts = self.acts.as_mut().filter(|_| self.timed);
+        let before = acts.as_ref().map_or(0, |acts| acts.spans.len());
+        let hops = acts.as_mut().map(|acts| &mut acts.spans);
+        self.exchange.fetch(board, stepped_to, &mut self.inboxes, hops)?;
+        if let Some(acts) = acts {
+            acts.came(before);
         }
+        self.exchange.check(board, now, &mut self.inboxes, &mut self.inputs.defects);
         Ok(&mut self.inboxes[board as usize])
     }
 
@@ -134,25 +134,29 @@ impl Host {
             self.acts = None;
         }
         self.timed = timed;
-        self.exchange.measure(timed);
+        self.exchange.stamp(timed);
     }
 
     /// What the wall clock shows, ns, where anything is timed; 0 otherwise.
-    pub(crate) fn clock(&self) -> u64 {
+    fn clock(&self) -> u64 {
         if self.timed { wall_ns() } else { 0 }
     }
 
-    /// Adds to what has been measured, and takes all of it.
-    pub(crate) fn take_spans(&mut self, more: impl IntoIterator<Item = Span>, into: &mut Vec<Span>) {
-        if let Some(acts) = &mut self.acts {
-            into.append(&mut acts.spans);
-            into.extend(more);
-        }
+    /// When the last step began, taking its mail in, and when it ended, on the wall clock, ns; 0 where it was not timed.
+    pub(crate) fn last_step(&self) -> (u64, u64) {
+        (self.began, self.ended)
     }
 
-    /// How many messages this process has sent, a channel each.
-    pub(crate) fn sent(&self) -> impl Iterator<Item = Span> {
-        self.exchange.sent()
+    /// What has been measured and not been taken, where anything is.
+    pub(crate) fn spans(&mut self) -> Option<&mut Vec<Span>> {
+        self.acts.as_mut().map(|acts| &mut acts.spans)
+    }
+
+    /// Measures how many messages this process has sent, a channel each.
+    pub(crate) fn count_sent(&mut self) {
+        if let Some(acts) = &mut self.acts {
+            acts.spans.extend(self.exchange.sent());
+        }
     }
 
     /// Steps the board that the grant names with the mail taken in.
@@ -195,7 +199,6 @@ impl Host {
             _ => std::mem::swap(&mut inputs.mail, inbox),
         }
         self.outputs.clear();
-        let begin = self.clock();
         if let Some((_, board)) = self.boards.iter_mut().find(|(known, _)| *known == id) {
             board.step(self.clocks.show(id, grant.until), &self.inputs, &mut self.outputs);
         }
@@ -208,9 +211,9 @@ impl Host {
         // an arm that stopped early stands there
         let stands = self.outputs.early.map_or(grant.until, |early| early.clamp(grant.from, grant.until));
         self.windows[id as usize] = (grant.from, stands);
-        let end = self.clock();
+        self.ended = self.clock();
         if let Some(acts) = &mut self.acts {
-            acts.stepped(id, grant, &self.inputs, &self.outputs, begin, end);
+            acts.stepped(id, grant, &self.inputs, &self.outputs, self.began, self.ended);
         }
         self.inputs.mail.clear();
         self.inputs.defects.clear();
@@ -249,7 +252,7 @@ impl Host {
 
     /// Takes in the mail for the chassis itself.
     pub fn read(&mut self) -> Result<&mut Mail, RunError> {
-        self.exchange.fetch(BoardId::Chassis, 0, &mut self.inboxes)?;
+        self.exchange.fetch(BoardId::Chassis, 0, &mut self.inboxes, None)?;
         Ok(&mut self.inboxes[BoardId::Chassis as usize])
     }
 

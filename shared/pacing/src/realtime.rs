@@ -22,7 +22,7 @@ use crate::host::{Answer, Factory};
 use crate::{Context, Flow, Observer, RunError};
 use board::{BoardId, Mail, Ns};
 use channels::{sleep_until, wall_ns};
-use messages::{BOARDS, Event, EventKind, Grant, Severity, Span, TransferRecord, flags};
+use messages::{BOARDS, Event, EventKind, Grant, Severity, TransferRecord, flags};
 use lives::Booting;
 use paced::{stage, stage_ns};
 use plan::{Draft, Plan};
@@ -223,10 +223,7 @@ impl<'f> Realtime<'f> {
             self.watch()?;
             self.rest_until(wall_ns() + MILLISECOND);
         }
-        let sent: Vec<Span> = self.boards.host.sent().collect();
-        if let Some(spans) = &mut self.boards.spans {
-            self.boards.host.take_spans(sent, spans);
-        }
+        self.boards.host.count_sent();
         self.boards.show_spans(observer)?;
         self.boards.power.shut_down();
         Ok(())
@@ -327,9 +324,7 @@ impl<'f> Realtime<'f> {
     }
 
     fn step_here(&mut self) -> Result<(), RunError> {
-        let mut unmeasured = Vec::new();
-        let spans = self.boards.spans.as_mut().unwrap_or(&mut unmeasured);
-        if let Some((grant, answer)) = self.local.step(&mut self.boards.host, spans)? {
+        if let Some((grant, answer)) = self.local.step(&mut self.boards.host)? {
             self.answered(BOARDS[grant.board as usize], grant.window, answer)?;
         }
         Ok(())

@@ -65,7 +65,7 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
     if context.measure {
         host.measure();
     }
-    let (mut transfers, mut spans) = (Vec::with_capacity(64), Vec::with_capacity(64));
+    let mut transfers = Vec::with_capacity(64);
     line.reply(here[0], READY, &Answer::default())?;
     bells.ring(CHASSIS_BELL);
     let mut until = 0;
@@ -115,8 +115,9 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
                 host.renew(BOARDS[grant.board as usize % BOARDS.len()])?;
             }
             let answer = host.step(&grant, &transfers)?;
-            host.take_spans([], &mut spans);
-            line.tell(&mut spans, true);
+            if let Some(spans) = host.spans() {
+                line.tell(spans, true);
+            }
             until = grant.until;
             if grant.flags & flags::FINISH != 0 {
                 patience = LEAVING_PERIOD;
@@ -143,13 +144,16 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
             if wall_ns() < due {
                 continue;
             }
-            if let Some((grant, answer)) = paced.step(&mut host, &mut spans)? {
+            if let Some((grant, answer)) = paced.step(&mut host)? {
                 until = grant.until;
-                if grant.flags & flags::FINISH != 0 {
+                let finish = grant.flags & flags::FINISH != 0;
+                if finish {
                     patience = LEAVING_PERIOD;
-                    host.take_spans(host.sent().collect::<Vec<_>>(), &mut spans);
+                    host.count_sent();
                 }
-                line.tell(&mut spans, grant.flags & flags::FINISH != 0);
+                if let Some(spans) = host.spans() {
+                    line.tell(spans, finish);
+                }
                 let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
                 line.reply(board, grant.window, &answer)?;
                 bells.ring(CHASSIS_BELL);

@@ -89,13 +89,12 @@ impl Paced {
         self.queue.front().map(|waiting| waiting.due)
     }
 
-    /// Carries the first grant out; `spans` gets what was measured of it.
-    pub fn step(&mut self, host: &mut Host, spans: &mut Vec<Span>) -> Result<Option<(Grant, Answer)>, RunError> {
+    /// Carries the first grant out.
+    pub fn step(&mut self, host: &mut Host) -> Result<Option<(Grant, Answer)>, RunError> {
         let Some(Waiting { due, mut grant, transfers }) = self.queue.pop_front() else { return Ok(None) };
         let board = BoardId::from_number(grant.board as u8).unwrap_or(BoardId::Chassis);
         let pace = &mut self.boards[board as usize];
         host.time(grant.flags & flags::UNMEASURED == 0);
-        let began = host.clock();
         let mail = host.fetch(board, grant.until, pace.stepped_to)?;
         // answers to an earlier job that come with those of the next must not count as the newest
         mail.words.sort_unstable_by_key(|word| (word.job, word.task, word.index));
@@ -110,18 +109,20 @@ impl Paced {
         }
         // what the arm does in a window reaches da_io in the next one, in lock step too
         pace.stepped_to = if board == BoardId::DaIo { grant.from } else { grant.until };
-        let step = Span {
-            t: grant.until,
-            due,
-            begin: began,
-            end: host.clock(),
-            window: grant.window,
-            late: (began.saturating_sub(due) > self.stage_ns).into(),
-            overwritten,
-            delayed: pace.writes.late,
-            ..Span::new(SpanKind::Step, board)
-        };
-        host.take_spans([step], spans);
+        let (begin, end) = host.last_step();
+        if let Some(spans) = host.spans() {
+            spans.push(Span {
+                t: grant.until,
+                due,
+                begin,
+                end,
+                window: grant.window,
+                late: (begin.saturating_sub(due) > self.stage_ns).into(),
+                overwritten,
+                delayed: pace.writes.late,
+                ..Span::new(SpanKind::Step, board)
+            });
+        }
         self.spare.push(transfers);
         Ok(Some((grant, answer)))
     }

@@ -4,7 +4,7 @@
 //! (no coordinated omission).
 
 use super::cycle::{Clock, Cycle, PARTS, Stamps, WHOLE};
-use super::row::{LatencyRow, Recorder, histogram};
+use super::row::{LatencyRow, Recorder, of_second};
 use board::routes::ROUTES;
 use hdrhistogram::Histogram;
 use messages::{BOARDS, BoardId, Span, SpanKind};
@@ -134,7 +134,7 @@ impl Journal {
             open: BTreeMap::new(),
             steps: VecDeque::with_capacity(REMEMBERED),
             turn: 0,
-            of_second: histogram(),
+            of_second: of_second(),
             measurement: Measurement {
                 rows: Vec::new(),
                 cycles: 0,

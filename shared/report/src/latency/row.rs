@@ -1,7 +1,7 @@
 //! One row of the table of latencies: a histogram over the whole run, and one of each second for the interval log.
 //!
-//! Values wait until their second is over and then go into the histograms together: a bucket apiece, far apart in memory,
-//! would cost several times as much. So does a row keep no more than the values of two seconds.
+//! Values wait until their second is over and then go into the histograms together, in their order: one by one, far apart in
+//! memory, they would cost several times as much. A row keeps no more than the values of two seconds.
 
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2Serializer;
@@ -60,10 +60,18 @@ pub struct Recorder {
     log: Vec<(u64, String)>,
 }
 
-/// An empty histogram, as every row has one.
-pub(super) fn histogram() -> Histogram<u64> {
+/// Digits to which a row tells values apart, and those of one of its seconds.
+const DIGITS: u8 = 3;
+const DIGITS_OF_SECOND: u8 = 2;
+
+fn histogram(digits: u8) -> Histogram<u64> {
     // bounds and digits are valid constants
-    Histogram::new_with_bounds(1, LONGEST_NS, 3).unwrap_or_else(|_| unreachable!())
+    Histogram::new_with_bounds(1, LONGEST_NS, digits).unwrap_or_else(|_| unreachable!())
+}
+
+/// An empty histogram of a second, for [`Recorder::settle`].
+pub(super) fn of_second() -> Histogram<u64> {
+    histogram(DIGITS_OF_SECOND)
 }
 
 impl Recorder {
@@ -73,7 +81,7 @@ impl Recorder {
             path: path.into(),
             n: 0,
             missed: None,
-            values: histogram(),
+            values: histogram(DIGITS),
             unsettled: VecDeque::with_capacity(2),
             spare: Vec::new(),
             log: Vec::new(),
@@ -119,7 +127,7 @@ impl Recorder {
         self.values.value_at_quantile(quantile)
     }
 
-    /// Counts the values of every second but the last one; `of_second` is an empty [`histogram`], and is so afterwards.
+    /// Counts the values of every second but the last one; `of_second` is empty, and is so afterwards.
     pub(super) fn settle(&mut self, of_second: &mut Histogram<u64>) {
         while self.unsettled.len() > 1 {
             self.settle_first(of_second);
@@ -128,6 +136,7 @@ impl Recorder {
 
     fn settle_first(&mut self, of_second: &mut Histogram<u64>) {
         let Some((second, mut values)) = self.unsettled.pop_front() else { return };
+        values.sort_unstable();
         for ns in &values {
             self.values.saturating_record((*ns).max(1));
             of_second.saturating_record((*ns).max(1));
@@ -154,7 +163,7 @@ impl Recorder {
 
     /// The finished row.
     pub fn finish(mut self) -> LatencyRow {
-        let mut of_second = histogram();
+        let mut of_second = of_second();
         while !self.unsettled.is_empty() {
             self.settle_first(&mut of_second);
         }
@@ -223,7 +232,7 @@ mod tests {
 
     #[test]
     fn a_row_keeps_no_values_of_a_second_that_is_settled() {
-        let (mut recorder, mut of_second) = (Recorder::new("step hw_sim"), histogram());
+        let (mut recorder, mut of_second) = (Recorder::new("step hw_sim"), of_second());
         for i in 0..100_000 {
             recorder.record(i * 1_000_000, i % 1000);
             recorder.settle(&mut of_second);

@@ -437,6 +437,13 @@ impl Board for ControlComputer {
                 self.defects.push(*defect);
             }
         }
+        if inputs.free_running && inputs.decision.is_some() {
+            // no number says that what is missing is lost
+            self.sensors.lost(Detector::MessageAge);
+            if let End::SecondCard { card, .. } = &mut self.end {
+                card.lost(Detector::MessageAge);
+            }
+        }
         for word in &inputs.mail.words {
             match &mut self.end {
                 _ if word.task == self.task => self.sensors.take(word),

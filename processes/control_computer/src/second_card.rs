@@ -89,6 +89,11 @@ impl SecondCard {
         self.sensors.take(word);
     }
 
+    /// Why words of the job under way that do not come are missing.
+    pub fn lost(&mut self, why: Detector) {
+        self.sensors.lost(why);
+    }
+
     /// What an access of its task that fails concerns.
     pub fn bus_ends(&mut self) -> (&mut Sensors, &mut Findings) {
         (&mut self.sensors, &mut self.findings)

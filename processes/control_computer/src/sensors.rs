@@ -149,7 +149,8 @@ impl Sensors {
         }
     }
 
-    /// A message with words of the job under way was discarded, or is known to be missing.
+    /// A message with words of the job under way was discarded, is known to be missing, or may come late; the first reason
+    /// counts.
     pub fn lost(&mut self, why: Detector) {
         self.lost.get_or_insert(why);
     }

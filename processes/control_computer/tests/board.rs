@@ -3,7 +3,7 @@
 mod rig;
 
 use messages::registers::{da, mailbox, parallel};
-use messages::{CommandKind, EventKind, drive_status};
+use messages::{CommandKind, Detector, EventKind, drive_status};
 use rig::{DECISION, PERIOD, Rig, command, table_5_3};
 use vme::{Op, Width};
 
@@ -247,4 +247,22 @@ fn a_computer_powered_up_again_in_the_middle_of_a_run_keeps_the_torque_off_until
     assert_eq!((io(parallel::ENABLE), io(parallel::BRAKE)), (Some(0x7F), Some(0x7F)));
     rig.run();
     assert_eq!(rig.written(rig.address("parallel-io", parallel::WATCHDOG_STATUS)), None, "once");
+}
+
+#[test]
+fn a_message_that_is_missing_is_lost_in_lock_step_and_late_where_nobody_waits_for_it() {
+    for (free_running, detector) in [(false, Detector::Sequence), (true, Detector::MessageAge)] {
+        let mut rig = Rig::new(table_5_3());
+        rig.inputs.free_running = free_running;
+        rig.run();
+        rig.answer();
+        let encoder = rig.address("encoder-1", 0);
+        rig.inputs.mail.words.retain(|word| word.addr & !0xFF != encoder);
+        rig.step();
+        let seen: Vec<u32> = rig.out.mail.events.iter().filter(|event| event.kind == EventKind::Detected as u32).map(|event| event.cause).collect();
+        assert_eq!(seen, [detector as u32]);
+        rig.finish();
+        rig.run();
+        assert_eq!(state(&rig), 0, "the next job has all it needs");
+    }
 }

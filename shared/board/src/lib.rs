@@ -41,6 +41,8 @@ pub struct Inputs {
     pub rerun: bool,
     /// The run ends with this step: write out what is pending.
     pub finish: bool,
+    /// Boards keep time by themselves and wait for nobody, as in real time: a message that is missing may still be on its way.
+    pub free_running: bool,
     /// A task of this board stands at its decision point at `until`.
     pub decision: Option<Decision>,
     /// Bus transfers made *to* this board in the window, and those of its own tasks that failed, in the order of `data_at`.

@@ -120,6 +120,11 @@ impl Host {
         Ok(&mut self.inboxes[board as usize])
     }
 
+    /// The boards keep time by themselves.
+    pub(crate) fn run_free(&mut self) {
+        self.inputs.free_running = true;
+    }
+
     /// From now on what the boards do is measured in simulated time.
     pub(crate) fn measure(&mut self) {
         self.acts = Some(Acts::default());

@@ -107,6 +107,7 @@ impl<'f> Realtime<'f> {
             boards.await_reply(remote)?;
         }
         let stops = Stops::new().map_err(|error| RunError::Refused { what: format!("SIGCONT: {error}") })?;
+        boards.host.run_free();
         let zero = wall_ns() + START_UP;
         let start = Grant { from: zero, flags: flags::START, ..boards.grant_of(BoardId::Chassis, 0, 0, 0) };
         for remote in 0..boards.remotes.len() {

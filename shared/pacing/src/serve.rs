@@ -88,6 +88,7 @@ fn host_until_the_end(path: PathBuf, name: &str, factory: Factory<'_>) -> Result
             }
             if grant.flags & flags::START != 0 && grant.from != 0 {
                 paced = Some(Paced::new(grant.from, &context.scenario));
+                host.run_free();
                 here.iter().for_each(|board| host.begins_anywhere(*board));
                 continue;
             }

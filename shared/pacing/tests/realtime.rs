@@ -20,6 +20,7 @@ impl Board for Listener {
         if inputs.boot && self.role == BoardId::ControlComputer {
             out.programs.push((0, vec![Op::Exec(10_000), Op::Decide]));
         }
+        assert!(inputs.boot || inputs.free_running);
         if !inputs.boot && !inputs.finish {
             let job = inputs.decision.map(|decision| decision.job);
             self.heard.send((self.role, inputs.from, inputs.until, job)).expect("the test listens");

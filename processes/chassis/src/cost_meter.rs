@@ -27,7 +27,8 @@ impl CostMeter {
     pub fn new(scenario: &Scenario, rack: &Realtime<'_>, period_ns: Ns) -> CostMeter {
         let hosts = |name: &str| scenario.processes.iter().find(|process| process.name == name);
         let of = |name: &str, pid| {
-            let on_the_way = hosts(name).is_some_and(|process| process.boards.iter().any(|board| ON_THE_WAY.contains(&board.as_str())));
+            let on_the_way = hosts(name)
+                .is_some_and(|process| process.boards.iter().any(|board| ON_THE_WAY.contains(&board.as_str())));
             (Compared { name: name.to_owned(), on_the_way }, pid)
         };
         let chassis = of("chassis", std::process::id());

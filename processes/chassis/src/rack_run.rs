@@ -120,11 +120,11 @@ pub fn run(
         None if witness.diverged => Ended::Diverged { at_s },
         None => Ended::Completed,
     };
-    let mut result = VariantResult::new(scenario, variant, &witness.trace, &witness.ledger, ended, at_s)?;
-    let measurement = witness.journal.map(Journal::finish);
+    let measurement = witness.journal.take().map(Journal::finish);
     if let Some(measurement) = measurement.as_ref().filter(|_| setting.pacing == Pacing::Realtime) {
-        result.measured.clone_from(&measurement.rows);
+        witness.trace.measured.clone_from(&measurement.rows);
     }
+    let mut result = VariantResult::new(scenario, variant, &witness.trace, &witness.ledger, ended, at_s)?;
     result.wall_s = Some(windows.as_secs_f64());
     let Witness { losses, start_up, cost, .. } = witness;
     let measuring_cost = cost.and_then(CostMeter::finish);

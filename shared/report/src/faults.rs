@@ -2,11 +2,13 @@
 //!
 //! A fault's time runs from its injection to the next one's, or to the end of the run.
 
+use crate::latency::LatencyRow;
 use crate::trace::{Trace, seconds};
 use messages::drive_status::BRAKE_ENGAGED;
 use messages::{Detector, Event, EventKind};
 use scenario::Scenario;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Names of the control computer's states, by number.
 const STATES: [&str; 5] = ["run", "degraded", "hold (SS2)", "stop (SS1)", "off (STO)"];
@@ -100,7 +102,7 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
         kind: stated.kind.name().into(),
         injected_s: seconds(from),
         detected_after_s: first.map(after),
-        detected_by: first.and_then(detector),
+        detected_by: first.and_then(detector).map(|detector| detector.name().into()),
         card: first.and_then(|event| silent_card(scenario, event)).map(str::to_owned),
         stopping_after_s: stopping.map(after),
         braked_after_s: braked.map(|t| seconds(t) - seconds(from)),
@@ -112,12 +114,35 @@ fn row(scenario: &Scenario, trace: &Trace, injected: &Event, end: vme::Ns) -> Op
     })
 }
 
-/// What fires although no fault has been injected yet: time (s) and name of each detector's events.
-pub(crate) fn trips(trace: &Trace) -> impl Iterator<Item = (f64, String)> {
+/// What fires although no fault has been injected yet, in words; in real time with what the machine has to do with it.
+pub(crate) fn trips(trace: &Trace) -> Vec<String> {
     let injected = trace.events.iter().find(|event| event.kind == EventKind::FaultInjected as u32);
     let from = injected.map_or(vme::Ns::MAX, |event| event.t);
-    let fired = move |event: &&Event| event.kind == EventKind::Detected as u32 && event.t < from;
-    trace.events.iter().filter(fired).filter_map(|event| Some((seconds(event.t), detector(event)?)))
+    let fired = |event: &&Event| event.kind == EventKind::Detected as u32 && event.t < from;
+    let mut times: BTreeMap<Detector, Vec<f64>> = BTreeMap::new();
+    for event in trace.events.iter().filter(fired) {
+        if let Some(detector) = detector(event) {
+            times.entry(detector).or_default().push(seconds(event.t));
+        }
+    }
+    let of_each = times.iter().map(|(detector, times)| {
+        let often = if times.len() > 1 { format!(" {} times, first", times.len()) } else { String::new() };
+        format!("{} fired{often} at {:.3} s: nothing was injected", detector.name(), times[0])
+    });
+    let late = if times.is_empty() { None } else { late_steps(&trace.measured) };
+    of_each.chain(late).collect()
+}
+
+/// How late the machine ran the boards' steps, where it did.
+fn late_steps(measured: &[LatencyRow]) -> Option<String> {
+    let steps = || measured.iter().filter(|row| row.path.starts_with("wake-up"));
+    let (late, all) = (steps().filter_map(|row| row.missed).sum::<u64>(), steps().map(|row| row.n).sum::<u64>());
+    let latest = steps().max_by_key(|row| row.max_ns).filter(|_| late > 0)?;
+    Some(format!(
+        "this machine began {late} of {all} steps more than a stage late, {} by {:.1} ms: what is late then is late in the rack",
+        latest.path.trim_start_matches("wake-up "),
+        latest.max_ns as f64 * 1e-6
+    ))
 }
 
 /// The card that has not answered, by the address at which the bus timer ended a cycle. Where the bus was not granted, no card
@@ -151,14 +176,14 @@ pub(crate) fn silences(scenario: &Scenario, trace: &Trace) -> Vec<String> {
 }
 
 /// What an event was detected by: the detector, or what such an event itself is.
-fn detector(event: &Event) -> Option<String> {
+fn detector(event: &Event) -> Option<Detector> {
     let of_kind = match EventKind::from_number(event.kind)? {
         EventKind::WatchdogExpired => Some(Detector::OutputWatchdog),
         EventKind::AmplifierTrip => Some(Detector::AmplifierTrip),
         EventKind::OverrunTrip => Some(Detector::Overrun),
         _ => None,
     };
-    Detector::from_number(event.cause).or(of_kind).map(|detector| detector.name().into())
+    Detector::from_number(event.cause).or(of_kind)
 }
 
 /// Headings of the fault table.

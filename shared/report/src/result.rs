@@ -160,7 +160,7 @@ impl VariantResult {
                     .push(format!("task {} lost {} releases: the job before still ran", task.name, task.lost_releases));
             }
         }
-        findings.extend(faults::trips(trace).map(|(at_s, name)| format!("{name} fired at {at_s:.3} s: nothing was injected")));
+        findings.extend(faults::trips(trace));
         let tripped = |event: &&messages::Event| event.kind == EventKind::OverrunTrip as u32;
         for event in trace.events.iter().filter(tripped) {
             let task = scenario.rack.tasks.get(event.b as usize);
@@ -186,7 +186,7 @@ impl VariantResult {
             transfers: ledger.paths(),
             transfer_errors: ledger.errors(),
             bus: trace.bus.clone(),
-            measured: Vec::new(),
+            measured: trace.measured.clone(),
             record: None,
             digest: None,
             unrecorded: Vec::new(),

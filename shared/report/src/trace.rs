@@ -1,6 +1,7 @@
 //! What a run leaves in memory for its report.
 
 use crate::accounting::BusAccount;
+use crate::latency::LatencyRow;
 use messages::{ControlProbe, Event, PlantProbe};
 use serde::Serialize;
 
@@ -15,6 +16,8 @@ pub struct Trace {
     pub events: Vec<Event>,
     /// Account of bus and processors, where the host made one.
     pub bus: Option<BusAccount>,
+    /// What was measured in real time; empty in simulated time.
+    pub measured: Vec<LatencyRow>,
 }
 
 impl Trace {

@@ -4,6 +4,7 @@ mod made_up;
 
 use made_up::{ledger, table_5_3, trace};
 use messages::{Detector, Event, EventKind, Severity};
+use report::latency::Recorder;
 use report::{Ended, VariantResult};
 
 const MS: u64 = 1_000_000;
@@ -66,11 +67,42 @@ fn a_time_out_that_is_known_ahead_does_not_hide_what_fires_before_it() {
 
 #[test]
 fn a_detector_that_fires_before_anything_was_injected_is_a_finding() {
-    let trip = event(1250, EventKind::Detected, 0.0, 0.0, Some(Detector::EncoderJump));
-    let result = result(&[trip, event(5000, EventKind::FaultInjected, 0.0, 0.0, None)]);
-    let found = result.findings.iter().find(|text| text.contains("was injected"));
-    assert_eq!(found.map(String::as_str), Some("encoder-jump fired at 1.250 s: nothing was injected"));
-    assert_eq!(result.faults[0].detected_by, None);
+    let trip = |ms, detector| event(ms, EventKind::Detected, 0.0, 0.0, Some(detector));
+    let result = result(&[
+        trip(1250, Detector::EncoderJump),
+        trip(1300, Detector::MessageAge),
+        trip(1350, Detector::MessageAge),
+        event(5000, EventKind::FaultInjected, 0.0, 0.0, None),
+        trip(5001, Detector::Sequence),
+    ]);
+    let found: Vec<&str> = result.findings.iter().map(String::as_str).filter(|text| text.contains("injected")).collect();
+    assert_eq!(
+        found,
+        [
+            "encoder-jump fired at 1.250 s: nothing was injected",
+            "message-age fired 2 times, first at 1.300 s: nothing was injected"
+        ]
+    );
+    assert_eq!(result.faults[0].detected_by.as_deref(), Some("sequence"));
+}
+
+#[test]
+fn in_real_time_a_detector_that_fires_uninjected_stands_beside_what_the_machine_did() {
+    let (variant, scenario) = table_5_3().swap_remove(0);
+    let mut steps = Recorder::counting_misses("wake-up da_io");
+    [20_000, 9_370_000, 30_000].iter().for_each(|late| steps.record(0, *late));
+    steps.miss();
+    let steps = steps.finish();
+    let findings = |events: &[Event]| {
+        let mut trace = trace(&scenario, 0.0, 13.0);
+        trace.events = events.to_vec();
+        trace.measured = vec![steps.clone()];
+        let result = VariantResult::new(&scenario, &variant, &trace, &ledger(&scenario), Ended::Completed, 13.0).unwrap();
+        result.findings.into_iter().filter(|text| text.contains("this machine")).collect::<Vec<_>>()
+    };
+    let late = "this machine began 1 of 3 steps more than a stage late, da_io by 9.4 ms: what is late then is late in the rack";
+    assert_eq!(findings(&[event(1250, EventKind::Detected, 0.0, 0.0, Some(Detector::MessageAge))]), [late]);
+    assert!(findings(&[]).is_empty());
 }
 
 #[test]

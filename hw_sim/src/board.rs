@@ -12,7 +12,7 @@ use crate::faults::Faults;
 use crate::integrate;
 use crate::plant::{Actuation, Evaluation, Plant};
 use crate::state::State;
-use arm::{DOF, JointVector, Pose, rotation};
+use arm::{DOF, FrozenArm, JointVector, Pose, rotation};
 use board::{Board, Inputs, Outputs};
 use messages::{AmplifierCommand, Event, EventKind, Ns, PlantProbe, PlantSample, Severity, drive_status};
 use nalgebra::Vector3;
@@ -30,6 +30,9 @@ pub struct HwSim {
     takes_changes: bool,
     /// Distance of the grid's points, ns.
     grid: Ns,
+    /// The arm about which semi-implicit Euler evaluates, and how long it is held (ns): from one multiple of it to the next.
+    arm: FrozenArm,
+    frozen: Ns,
     runaway: f64,
     /// Instant of `state`.
     t: Ns,
@@ -57,12 +60,15 @@ impl HwSim {
         let (plant, state) = Plant::new(scenario)?;
         let integrator = scenario.plant.integrator;
         let now = plant.evaluate(&state, &Actuation::SAFE);
+        let grid = scenario::nanoseconds(1.0 / scenario.plant.rate_hz);
         let mut sim = HwSim {
             takes_changes: plant.joints == Joints::Flexible && integrator == Integrator::SemiImplicit,
+            arm: plant.frozen(&state, 0.0),
+            frozen: grid * Ns::from(scenario.plant.frozen_steps),
             plant,
             task_frame: scenario.task_frame(),
             integrator,
-            grid: scenario::nanoseconds(1.0 / scenario.plant.rate_hz),
+            grid,
             runaway: scenario.plant.runaway_rad_per_s,
             t: 0,
             state,
@@ -90,8 +96,15 @@ impl HwSim {
     /// Makes `now` the forces in the committed state.
     fn evaluate(&mut self) {
         if !self.known {
-            self.now = self.plant.evaluate(&self.state, &self.actuation);
+            self.now = self.forces(&self.state, &self.actuation);
             self.known = true;
+        }
+    }
+
+    fn forces(&self, state: &State, actuation: &Actuation) -> Evaluation {
+        match self.integrator {
+            Integrator::SemiImplicit => self.plant.evaluate_about(&self.arm, state, actuation),
+            Integrator::Rk4 => self.plant.evaluate(state, actuation),
         }
     }
 
@@ -188,6 +201,9 @@ impl HwSim {
             out.mail.events.push(Event::new(t, EventKind::Diverged, Severity::Error, joint as f64, value));
             return false;
         }
+        if self.integrator == Integrator::SemiImplicit && t % self.frozen == 0 {
+            self.arm = self.plant.frozen(&self.state, seconds(self.frozen - self.grid));
+        }
         self.status = self.switches();
         true
     }
@@ -254,7 +270,7 @@ impl HwSim {
             let (mut state, motor, h) = (self.state, self.motor_until(until), seconds(until - self.t));
             integrate::step(&self.plant, self.integrator, &mut state, &self.now, &self.actuation, &motor, h);
             let actuation = self.waiting(until).last().map_or(self.actuation, |last| self.actuation_of(last));
-            let now = self.plant.evaluate(&state, &actuation);
+            let now = self.forces(&state, &actuation);
             if state.out_of_domain(self.runaway).is_some() {
                 // the next step of the grid will find it too and say so
                 return self.repeat(until, out);

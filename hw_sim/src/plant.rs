@@ -8,7 +8,7 @@ use crate::drive::Drive;
 use crate::drives::{Drives, Driving, Losses};
 use crate::sensor::Sensor;
 use crate::state::{CONTACT_POINTS, State};
-use arm::{ArmModel, ArmState, DOF, JointVector, Pose, Spatial};
+use arm::{ArmModel, ArmState, DOF, FrozenArm, JointVector, Pose, Spatial};
 use messages::AmplifierCommand;
 use scenario::{Joints, Scenario};
 
@@ -140,24 +140,36 @@ impl Plant {
         state
     }
 
+    /// The arm as it is half way through the next `span` seconds, if the joints keep their speeds.
+    pub fn frozen(&self, state: &State, span: f64) -> FrozenArm {
+        let armature = match self.joints {
+            Joints::Flexible => JointVector::zeros(),
+            Joints::Rigid => self.drives.rotor,
+        };
+        FrozenArm::new(&ArmState::new(&self.arm, &(state.q + state.qd * (0.5 * span)), &state.qd), &armature)
+    }
+
     /// Forces and accelerations in `state` under `actuation`.
     pub fn evaluate(&self, state: &State, actuation: &Actuation) -> Evaluation {
-        let arm = ArmState::new(&self.arm, &state.q, &state.qd);
-        let (pose, twist) = (arm.pose(), arm.twist());
+        self.evaluate_about(&self.frozen(state, 0.0), state, actuation)
+    }
+
+    /// The same with an arm frozen near `state`.
+    pub fn evaluate_about(&self, arm: &FrozenArm, state: &State, actuation: &Actuation) -> Evaluation {
+        let (pose, twist) = (arm.pose(&state.q), arm.twist(&state.qd));
         let touch = self.touch(&pose, &twist, state);
         let f_tip = -touch.wrench;
         let motor = self.drives.motor_torques(actuation);
         let (qdd, driving) = match self.joints {
             Joints::Flexible => {
                 let driving = self.drives.flexible(state, actuation, &motor);
-                (arm.accelerations(&driving.on_link, &JointVector::zeros(), &f_tip), driving)
+                (arm.accelerations(&driving.on_link, &f_tip), driving)
             }
             Joints::Rigid => {
                 let loss = self.drives.rigid(state, actuation);
                 let torque = motor - loss.friction - loss.brake;
-                let rotors = self.drives.rotor;
-                let qdd = arm.accelerations(&torque, &rotors, &f_tip);
-                (qdd, Driving { loss, theta_ddot: qdd, on_link: torque - rotors.component_mul(&qdd) })
+                let qdd = arm.accelerations(&torque, &f_tip);
+                (qdd, Driving { loss, theta_ddot: qdd, on_link: torque - self.drives.rotor.component_mul(&qdd) })
             }
         };
         let Driving { loss, theta_ddot, on_link: transmitted } = driving;

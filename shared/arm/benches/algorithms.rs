@@ -4,7 +4,7 @@
 //!     cargo bench -p arm            # the table beside Pinocchio's: scripts/reference/bench_outside.py, same names
 
 use arm::{
-    ArmModel, ArmState, JointVector, Spatial, aba, crba, forward_kinematics, jacobian, jdot_qd, rnea, tip_motion,
+    ArmModel, ArmState, FrozenArm, JointVector, Spatial, aba, crba, forward_kinematics, jacobian, jdot_qd, rnea, tip_motion,
 };
 use std::hint::black_box;
 use std::time::Instant;
@@ -57,11 +57,13 @@ fn main() {
     bench("rnea", &states, |s| rnea(&model, &s.q, &s.qd, &s.x));
     bench("crba", &states, |s| crba(&model, &s.q));
     bench("aba", &states, |s| aba(&model, &s.q, &s.qd, &s.x, &none, &free));
-    // the same by the mass matrix, behind the tip's motion: what a plant step asks of the model
-    bench("tip+fd", &states, |s| {
-        let state = ArmState::new(&model, &s.q, &s.qd);
-        let tip = state.tip_motion();
-        state.accelerations(&s.x, &none, &tip.twist)
+    // frozen and asked once, and asked nearby: what a plant step asks of the model
+    bench("frozen+fd", &states, |s| FrozenArm::new(&ArmState::new(&model, &s.q, &s.qd), &none).accelerations(&s.x, &free));
+    let frozen = FrozenArm::new(&ArmState::new(&model, &states[0].q, &states[0].qd), &none);
+    bench("nearby", &states, |s| {
+        let (pose, twist) = (frozen.pose(&s.q), frozen.twist(&s.qd));
+        let qdd = frozen.accelerations(&s.x, &twist);
+        (pose, frozen.tip_acceleration(&qdd))
     });
     // tip motion, then torques for accelerations that depend on it: what a control step asks of the model
     bench("tip+rnea", &states, |s| {

@@ -148,15 +148,6 @@ impl Motion {
     }
 }
 
-/// J x.
-#[inline(always)]
-pub(crate) fn jacobian_times(screws: &Screws, x: &JointVector) -> Spatial {
-    let x = pairs_of(x, 0.0);
-    let linear = std::array::from_fn(|k| screws[k].s * x[k]);
-    let angular = std::array::from_fn(|k| screws[k].r.z * x[k]);
-    spatial(total(&linear), total(&angular))
-}
-
 #[inline(always)]
 pub(crate) fn spatial(linear: V3, angular: V3) -> Spatial {
     Spatial::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)

@@ -11,6 +11,7 @@
 //! | `kinematics` | tip pose, Jacobian, J̇q̇ |
 //! | `rnea`, `crba`, `aba` | inverse dynamics, mass matrix, forward dynamics |
 //! | `state` | the same with one kinematics pass shared |
+//! | `frozen` | the arm about one posture, for many short steps |
 //! | `slide` | the one-axis test arm |
 //! | `drives` | gears, friction, amplifiers, brakes: data |
 //! | `mismatch` | a plant that differs from the controller's model |
@@ -23,7 +24,7 @@ mod chain;
 mod crba;
 pub mod drives;
 mod exponential;
-mod forward;
+mod frozen;
 mod inertia;
 mod kinematics;
 mod lanes;
@@ -40,6 +41,7 @@ mod urdf;
 
 pub use aba::aba;
 pub use crba::crba;
+pub use frozen::FrozenArm;
 pub use inertia::BodyInertia;
 pub use kinematics::{Pose, TipMotion, forward_kinematics, jacobian, jdot_qd, joint_origins, tip_motion};
 pub use mismatch::Mismatch;

@@ -6,8 +6,7 @@
 use crate::aba::aba_in;
 use crate::bodies::bodies;
 use crate::crba::crba_in;
-use crate::forward::accelerations;
-use crate::kinematics::{Motion, Pose, Screws, TipMotion, frames, jacobian_of, jacobian_times, screws, tip_motion_of};
+use crate::kinematics::{Motion, Pose, Screws, TipMotion, frames, jacobian_of, screws, tip_motion_of};
 use crate::lanes::{from_tip, lane};
 use crate::model::ArmModel;
 use crate::rnea::rnea_in;
@@ -33,6 +32,11 @@ impl<'m> ArmState<'m> {
         ArmState { model, pose: frames[DOF].pose(), screws, motion: Motion::new(&screws, qd), q: *q, qd: *qd }
     }
 
+    /// Joint angles (rad).
+    pub fn q(&self) -> &JointVector {
+        &self.q
+    }
+
     /// See [`crate::forward_kinematics`].
     pub fn pose(&self) -> Pose {
         match &self.model.slide {
@@ -54,22 +58,6 @@ impl<'m> ArmState<'m> {
         match &self.model.slide {
             Some(slide) => slide.tip_motion(&self.q, &self.qd),
             None => tip_motion_of(self.pose, &self.screws, &self.motion),
-        }
-    }
-
-    /// Twist of the tip: J q̇ (m/s, rad/s; base axes).
-    pub fn twist(&self) -> Spatial {
-        match &self.model.slide {
-            Some(slide) => slide.tip_motion(&self.q, &self.qd).twist,
-            None => self.motion.tip().0,
-        }
-    }
-
-    /// Acceleration of the tip under joint accelerations: J q̈ + J̇q̇ (m/s², rad/s²; base axes).
-    pub fn tip_acceleration(&self, qdd: &JointVector) -> Spatial {
-        match &self.model.slide {
-            Some(slide) => slide.jacobian() * qdd,
-            None => self.motion.tip().1 + jacobian_times(&self.screws, qdd),
         }
     }
 
@@ -116,14 +104,6 @@ impl<'m> ArmState<'m> {
                 let all = lane(&from_tip(&bodies(self.model, &self.screws)), 0);
                 -self.model.gravity.dot(all.first + self.model.chain.fixed)
             }
-        }
-    }
-
-    /// What [`crate::aba()`] gives, by factorising the mass matrix: faster, and the same up to rounding.
-    pub fn accelerations(&self, tau: &JointVector, armature: &JointVector, f_tip: &Spatial) -> JointVector {
-        match &self.model.slide {
-            Some(slide) => slide.aba(self.model.gravity, tau, armature, f_tip),
-            None => accelerations(self.model, &self.screws, &self.motion, tau, armature, f_tip),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 #![allow(unsafe_code)] // a global allocator cannot be written without
 
-use arm::{ArmModel, ArmState, JointVector, Spatial, aba, bias, crba, gravity_torque, rnea, tip_motion};
+use arm::{ArmModel, ArmState, FrozenArm, JointVector, Spatial, aba, bias, crba, gravity_torque, rnea, tip_motion};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -41,7 +41,9 @@ fn no_algorithm_allocates() {
         sum += crba(model, &q).sum() + aba(model, &q, &qd, &q, &qd.abs(), &Spatial::repeat(1.0)).sum();
         let state = ArmState::new(model, &q, &qd);
         sum += state.mass_matrix().sum() + state.rnea(&q).sum() + state.tip_motion().twist.sum();
-        sum += state.accelerations(&q, &qd.abs(), &Spatial::repeat(1.0)).sum() + state.tip_acceleration(&q).sum();
+        let frozen = FrozenArm::new(&state, &qd.abs());
+        sum += frozen.accelerations(&q, &Spatial::repeat(1.0)).sum() + frozen.tip_acceleration(&q).sum();
+        sum += frozen.pose(&qd).p.sum() + frozen.twist(&qd).sum();
         sum += state.potential_energy();
         // a large angle, whose reduction takes another way
         sum += rnea(model, &JointVector::repeat(1e9), &qd, &q).sum();

@@ -67,6 +67,7 @@ fn all<const N: usize>(key: &str, values: &[f64; N], rule: impl Fn(String, f64) 
 fn plant(scenario: &Scenario) -> Result {
     let plant = &scenario.plant;
     within("plant.rate_hz", plant.rate_hz, 1e3..=1e6, "1000 to 1 000 000")?;
+    within("plant.frozen_steps", plant.frozen_steps.into(), 1.0..=100.0, "1 to 100")?;
     within("plant.friction_scale", plant.friction_scale, 0.0..=10.0, "0 to 10")?;
     positive("plant.runaway_rad_per_s", plant.runaway_rad_per_s)?;
     positive("arm.slide_mass_kg", scenario.arm.slide_mass_kg)?;

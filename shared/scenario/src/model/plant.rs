@@ -106,6 +106,8 @@ pub struct Plant {
     pub rate_hz: f64,
     /// Integration scheme.
     pub integrator: Integrator,
+    /// Steps for which semi-implicit Euler holds the arm's mass matrix, bias and Jacobian.
+    pub frozen_steps: u32,
     /// Flexible or rigid transmissions.
     pub joints: Joints,
     /// Factor on every friction figure of the drives (0 = none).
@@ -127,6 +129,7 @@ impl Default for Plant {
         Plant {
             rate_hz: 10_000.0,
             integrator: Integrator::SemiImplicit,
+            frozen_steps: 10,
             joints: Joints::Flexible,
             friction_scale: 1.0,
             kinematic_error: false,
@@ -141,7 +144,7 @@ impl Default for Plant {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
-    /// Semi-implicit Euler: one evaluation a step.
+    /// Semi-implicit Euler: one evaluation a step, about an arm that is renewed every `frozen_steps`.
     SemiImplicit,
     /// Classical Runge–Kutta of fourth order: four evaluations a step.
     Rk4,

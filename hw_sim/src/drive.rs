@@ -70,6 +70,11 @@ impl Drive {
         }
     }
 
+    /// The gear is without kinematic error.
+    pub fn has_true_gear(&self) -> bool {
+        self.kinematic_error == KinematicError::default()
+    }
+
     /// The brake's deflection (rad) under a torque (Nm) that it holds at rest.
     pub fn brake_deflection_under(&self, torque: f64) -> f64 {
         self.brake.held(torque / self.brake.stiffness, self.brake_capacity)
@@ -149,7 +154,7 @@ impl Drive<Pair> {
 }
 
 /// Σ A_k sin(k θ_m + φ_k) for k = 1, 2, 4, as products of the motor angle's sine and cosine.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct KinematicError<T = f64> {
     /// A_k cos φ_k.
     in_phase: [T; 3],

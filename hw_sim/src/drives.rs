@@ -14,6 +14,8 @@ const PAIRS: usize = DOF.div_ceil(2);
 pub struct Drives {
     joints: [Drive; DOF],
     pairs: [Drive<Pair>; PAIRS],
+    /// No gear has a kinematic error.
+    true_gears: bool,
     /// N² J_m, kg m².
     pub rotor: JointVector,
     /// Their reciprocals.
@@ -42,6 +44,7 @@ impl Drives {
         let each = |part: fn(&Drive) -> f64| JointVector::from_fn(|i, _| part(&joints[i]));
         Drives {
             pairs: std::array::from_fn(|k| Drive::of_two(&joints[2 * k], &joints[(2 * k + 1).min(DOF - 1)])),
+            true_gears: joints.iter().all(Drive::has_true_gear),
             rotor: each(|drive| drive.rotor),
             mobility: each(|drive| drive.mobility),
             gear_ratio: each(|drive| drive.gear_ratio),
@@ -68,7 +71,10 @@ impl Drives {
         let mut driving = Driving::default();
         let held = actuation.held();
         // the long series by themselves, so that the processor can work at several joints at once
-        let gears: [_; PAIRS] = std::array::from_fn(|k| self.pairs[k].gear(of(&state.theta, k)));
+        let gears: [_; PAIRS] = match self.true_gears {
+            true => std::array::from_fn(|k| (of(&state.theta, k), Pair::ONE)),
+            false => std::array::from_fn(|k| self.pairs[k].gear(of(&state.theta, k))),
+        };
         let stribeck: [_; PAIRS] = std::array::from_fn(|k| self.pairs[k].stribeck(of(&state.theta_dot, k)));
         for (k, pair) in self.pairs.iter().enumerate() {
             let v = of(&state.theta_dot, k);

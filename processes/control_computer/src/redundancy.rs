@@ -5,7 +5,7 @@
 //! the task, the joint-limit task, and the damping of self-motion. W_v also bounds accelerations near a singularity, at
 //! the price of the gain σ²/(σ² + w_v) along a singular value σ. Directions without any weight get no acceleration.
 
-use crate::cholesky::Cholesky;
+use crate::cholesky::{Cholesky, Row};
 use crate::frame::{TaskKinematics, dot, transposed_times};
 use crate::joint_limits::LimitTask;
 use arm::{DOF, Jacobian, JointVector, Spatial};
@@ -60,13 +60,13 @@ impl<'a> Resolution<'a> {
     }
 }
 
-/// Lower triangle of JᵀWJ + diag.
-fn normal_matrix(j: &Jacobian, w: &Spatial, diagonal: &JointVector) -> [[f64; DOF]; DOF] {
+/// Upper triangle of JᵀWJ + diag.
+fn normal_matrix(j: &Jacobian, w: &Spatial, diagonal: &JointVector) -> [Row; DOF] {
     let (j, w) = (&j.data.0, &w.data.0[0]);
-    let mut a = [[0.0; DOF]; DOF];
+    let mut a = [Row::default(); DOF];
     for row in 0..DOF {
         let weighted: [f64; 6] = std::array::from_fn(|k| j[row][k] * w[k]);
-        for column in 0..=row {
+        for column in row..DOF {
             a[row][column] = dot(&weighted, &j[column]);
         }
         a[row][row] += diagonal[row];

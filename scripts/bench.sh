@@ -38,7 +38,7 @@ outside() {
     echo "control_step: Pinocchio's has kinematics, the 7x7 solve and RNEA only, ours AHIC, ERC and wrenches too."
     echo "aba: MuJoCo has none, its forward dynamics (CRB and a factorisation) stand there."
     echo "plant_step: MuJoCo's is rigid and touches nothing, ours has flexible joints, friction and contact."
-    echo "tip+rnea, tip+fd: what a control step and a plant step ask of the arm's model."
+    echo "tip+rnea: what a control step asks of the arm's model; frozen+fd, nearby: a plant step, the first and the nine after it."
 }
 
 echo "machine: $(uname -sr), $(nproc) cores, $(sed -n 's/^model name\t*: //p' /proc/cpuinfo | head -n 1), load $(cut -d' ' -f1-3 /proc/loadavg)"

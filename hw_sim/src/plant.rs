@@ -127,7 +127,7 @@ impl Plant {
         let mut state = State::at_rest(q);
         let arm = ArmState::new(&self.arm, &q, &JointVector::zeros());
         let touch = self.touch(&arm.pose(), &Spatial::zeros(), &state);
-        state.load = arm.bias() + arm.jacobian().tr_mul(&touch.wrench);
+        state.load = arm.dynamics().1 + arm.jacobian().tr_mul(&touch.wrench);
         for (i, drive) in self.drives.iter().enumerate() {
             let torque = state.load[i];
             let mut on_rotor = torque;

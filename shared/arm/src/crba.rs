@@ -15,25 +15,22 @@ use crate::{DOF, JointMatrix, JointVector};
 pub fn crba(model: &ArmModel, q: &JointVector) -> JointMatrix {
     match &model.slide {
         Some(slide) => slide.crba(),
-        None => crba_in(model, &screws(&frames(model, q))),
+        None => {
+            let screws = screws(&frames(model, q));
+            crba_in(&screws, &bodies(model, &screws))
+        }
     }
 }
 
 #[inline(always)]
-pub(crate) fn crba_in(model: &ArmModel, screws: &Screws) -> JointMatrix {
-    let rows = mass_rows(screws, &bodies(model, screws));
-    JointMatrix::from_fn(|i, j| lane(&rows[i.min(j)], i.max(j)))
-}
-
-/// Rows of M from the diagonal on; what stands before the diagonal, or in the tip's lane, means nothing.
-#[inline(always)]
-pub(crate) fn mass_rows(screws: &Screws, links: &Bodies) -> [[Pair; PAIRS]; DOF] {
+pub(crate) fn crba_in(screws: &Screws, links: &Bodies) -> JointMatrix {
     let composites = from_tip(links);
     // momentum rates of the composites about the tip, each for its own joint's unit acceleration
     let rates: [Wrench<Pair>; PAIRS] = std::array::from_fn(|k| {
         let (s, z, body) = (screws[k].s, screws[k].r.z, &composites[k]);
         Wrench { f: z.cross(body.first), n: body.second.momentum(z) + body.first.cross(s) }
     });
+    // rows from the diagonal on; what stands before it, or in the tip's lane, means nothing
     let mut rows = [[Pair::default(); PAIRS]; DOF];
     for j in 0..PAIRS {
         // the first joints, each with all
@@ -47,5 +44,5 @@ pub(crate) fn mass_rows(screws: &Screws, links: &Bodies) -> [[Pair; PAIRS]; DOF]
             rows[j + PAIRS][k] = along(&screws[j], &rates[k]);
         }
     }
-    rows
+    JointMatrix::from_fn(|i, j| lane(&rows[i.min(j)], i.max(j)))
 }

@@ -28,7 +28,7 @@ pub struct FrozenArm {
 impl FrozenArm {
     /// The arm about `state`. `armature` (kg m²) is added to the mass matrix' diagonal.
     pub fn new(state: &ArmState, armature: &JointVector) -> FrozenArm {
-        let (tip, mass) = (state.tip_motion(), state.mass_matrix());
+        let (tip, (mass, bias)) = (state.tip_motion(), state.dynamics());
         let mut inertia = [[0.0; ROWS]; DOF];
         for (i, row) in inertia.iter_mut().enumerate() {
             row[..DOF].copy_from_slice(mass.column(i).as_slice());
@@ -39,7 +39,7 @@ impl FrozenArm {
             pose: tip.pose,
             jacobian: tip.jacobian.data.0,
             jdot_qd: tip.jdot_qd.into(),
-            bias: state.bias(),
+            bias,
             mobility: inverted(inertia),
         }
     }

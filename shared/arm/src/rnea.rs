@@ -5,10 +5,9 @@
 
 use crate::bodies::{Bodies, Wrench, bodies, wrenches};
 use crate::kinematics::{Motion, Screw, Screws, frames, screws};
-use crate::lanes::{Lanes, PAIRS, Pair, from_base, from_tip, joints_of, pairs_of};
+use crate::lanes::{Pair, from_base, from_tip, joints_of, pairs_of};
 use crate::model::ArmModel;
-use crate::small::{V3, v3};
-use crate::{JointVector, Spatial};
+use crate::JointVector;
 
 /// Joint torques (Nm) for angles, speeds and accelerations (rad, rad/s, rad/s²): M(q) q̈ + C(q, q̇) q̇ + g(q).
 pub fn rnea(model: &ArmModel, q: &JointVector, qd: &JointVector, qdd: &JointVector) -> JointVector {
@@ -17,7 +16,7 @@ pub fn rnea(model: &ArmModel, q: &JointVector, qd: &JointVector, qdd: &JointVect
         None => {
             let screws = screws(&frames(model, q));
             let motion = Motion::new(&screws, qd).accelerated(&screws, qdd);
-            rnea_in(model, &screws, &motion)
+            rnea_in(model, &screws, &motion, &bodies(model, &screws))
         }
     }
 }
@@ -28,7 +27,7 @@ pub fn bias(model: &ArmModel, q: &JointVector, qd: &JointVector) -> JointVector 
         Some(slide) => slide.rnea(model.gravity, &JointVector::zeros()),
         None => {
             let screws = screws(&frames(model, q));
-            rnea_in(model, &screws, &Motion::new(&screws, qd))
+            rnea_in(model, &screws, &Motion::new(&screws, qd), &bodies(model, &screws))
         }
     }
 }
@@ -39,20 +38,10 @@ pub fn gravity_torque(model: &ArmModel, q: &JointVector) -> JointVector {
 }
 
 #[inline(always)]
-pub(crate) fn rnea_in(model: &ArmModel, screws: &Screws, motion: &Motion) -> JointVector {
-    let carried = carried(model, motion, &bodies(model, screws), &Spatial::zeros());
+pub(crate) fn rnea_in(model: &ArmModel, screws: &Screws, motion: &Motion, bodies: &Bodies) -> JointVector {
+    // what each joint carries of the links beyond it
+    let carried = from_tip(&wrenches(bodies, model.gravity, motion));
     joints_of(&std::array::from_fn(|k| along(&screws[k], &carried[k])))
-}
-
-/// The inward pass: what each joint carries of the links beyond it. `f_tip` acts ON the tip.
-#[inline(always)]
-pub(crate) fn carried(model: &ArmModel, motion: &Motion, bodies: &Bodies, f_tip: &Spatial) -> [Wrench<Pair>; PAIRS] {
-    let mut wrenches = wrenches(bodies, model.gravity, motion);
-    // the tip itself is no body: its lane has what the surroundings take off link 7
-    let at_tip = |k: usize| V3::pair(V3::ZERO, v3(-f_tip[k], -f_tip[k + 1], -f_tip[k + 2]));
-    wrenches[PAIRS - 1].f += at_tip(0);
-    wrenches[PAIRS - 1].n += at_tip(3);
-    from_tip(&wrenches)
 }
 
 /// Component of a wrench along a joint: its torque.

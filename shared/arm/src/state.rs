@@ -67,24 +67,24 @@ impl<'m> ArmState<'m> {
             Some(slide) => slide.rnea(self.model.gravity, qdd),
             None => {
                 let motion = self.motion.accelerated(&self.screws, qdd);
-                rnea_in(self.model, &self.screws, &motion)
+                rnea_in(self.model, &self.screws, &motion, &bodies(self.model, &self.screws))
             }
-        }
-    }
-
-    /// See [`crate::bias`].
-    pub fn bias(&self) -> JointVector {
-        match &self.model.slide {
-            Some(slide) => slide.rnea(self.model.gravity, &JointVector::zeros()),
-            None => rnea_in(self.model, &self.screws, &self.motion),
         }
     }
 
     /// See [`crate::crba()`].
     pub fn mass_matrix(&self) -> JointMatrix {
+        self.dynamics().0
+    }
+
+    /// Mass matrix M(q) (kg m²) and bias C(q, q̇) q̇ + g(q) (Nm), which share the links' moments.
+    pub fn dynamics(&self) -> (JointMatrix, JointVector) {
         match &self.model.slide {
-            Some(slide) => slide.crba(),
-            None => crba_in(self.model, &self.screws),
+            Some(slide) => (slide.crba(), slide.rnea(self.model.gravity, &JointVector::zeros())),
+            None => {
+                let bodies = bodies(self.model, &self.screws);
+                (crba_in(&self.screws, &bodies), rnea_in(self.model, &self.screws, &self.motion, &bodies))
+            }
         }
     }
 

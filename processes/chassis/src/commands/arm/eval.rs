@@ -55,7 +55,7 @@ fn evaluate(model: &ArmModel, state: &State) -> Answer {
         jdot_qd,
         ..
     } = at.tip_motion();
-    let mass_matrix = at.mass_matrix();
+    let (mass_matrix, bias) = at.dynamics();
     let fd = at.aba(&state.tau, &JointVector::zeros(), &Spatial::zeros());
     let (p, r) = (pose.p, pose.r);
     Answer {
@@ -68,7 +68,7 @@ fn evaluate(model: &ArmModel, state: &State) -> Answer {
         jacobian: std::array::from_fn(|i| std::array::from_fn(|k| jacobian[(i, k)])),
         jdot_qd: jdot_qd.into(),
         mass_matrix: std::array::from_fn(|i| std::array::from_fn(|k| mass_matrix[(i, k)])),
-        bias: at.bias().into(),
+        bias: bias.into(),
         rnea: at.rnea(&state.qdd).into(),
         fd: fd.into(),
     }

@@ -168,6 +168,29 @@ fn a_violated_limit_on_a_latency_gives_exit_code_4() {
 }
 
 #[test]
+fn what_measuring_costs_is_told_of_every_process_from_stretches_of_one_run() {
+    let bench = Bench::new();
+    let scenario = bench.scenario("s.toml", &[]);
+    let arguments = ["latency", scenario, "--seconds", "0.5", "--rate", "1000", "--cost", "--out", "out", "--json"];
+    let outcome = bench.run(&arguments).expect_code(0).expect_nothing_left();
+    let report: serde_json::Value = serde_json::from_str(&outcome.stdout).expect("JSON");
+    let cost = &report["measuring_cost"];
+    // 20 s in stretches of 0.2 s
+    assert_eq!(cost["pairs"], 50, "{cost:#}");
+    let processes = cost["processes"].as_array().expect("rows");
+    assert_eq!(processes.len(), 8, "{cost:#}");
+    for row in processes.iter().chain([&cost["on_the_way"], &cost["all"]]) {
+        let ns = |key: &str| row[key].as_f64().expect("a number");
+        assert!(ns("with_ns") > 0.0 && ns("without_ns") > 0.0, "{row:#}");
+        let [low, high] = [0, 1].map(|i| row["interval_ns"][i].as_f64().expect("a number"));
+        assert!(low <= ns("difference_ns") && ns("difference_ns") <= high, "{row:#}");
+    }
+    let sum = |key: &str| processes.iter().filter_map(|row| row[key].as_f64()).sum::<f64>();
+    let all = cost["all"]["mean_ns"].as_f64().expect("a number");
+    assert!((sum("mean_ns") - all).abs() < 1e-6 * sum("with_ns"), "{cost:#}");
+}
+
+#[test]
 fn the_doctor_gives_a_remedy_for_everything_that_hurts() {
     let outcome = Bench::new().run(&["doctor", "--json"]).expect_code(0).expect_nothing_left();
     let findings: serde_json::Value = serde_json::from_str(&outcome.stdout).expect("JSON");

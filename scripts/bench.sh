@@ -125,15 +125,18 @@ limited "$release/vmerack" sweep one-axis-delay --variant zeta-1 --set duration_
 awk -v a="$start" -v b="$(date +%s.%N)" 'BEGIN { printf "%.0f\n", 500 * 60 / (b - a) }'
 
 echo
-echo "greatest resident size of each process, MB"
-"$release/vmerack" run table-5-3 --variant modified --set 'report.sweep=[]' --duration 60 --out "$out" --json >/dev/null 2>&1 &
+echo "greatest resident size of each process in Table 5-3, one variant, MB (limit 50)"
+"$release/vmerack" run table-5-3 --variant modified --set 'report.sweep=[]' --out "$out" --json >/dev/null 2>&1 &
 rack=$!
-sleep 1
-for pid in $rack $(pgrep -P "$rack"); do
-    awk -v n="$(cat "/proc/$pid/comm")" '/VmHWM/ { printf "%-20s %6.1f\n", n, $2 / 1024 }' "/proc/$pid/status"
-done
-kill -INT "$rack"
+while [ -e "/proc/$rack/status" ] && kill -0 "$rack" 2>/dev/null; do
+    for pid in $rack $(pgrep -P "$rack"); do
+        awk '/^Name/ { name = $2 } /VmHWM/ { print name, $2 / 1024 }' "/proc/$pid/status" 2>/dev/null || true
+    done
+    sleep 0.02
+done >"$out/sizes"
 wait "$rack" || true
+awk '{ if (!($1 in size)) names[++n] = $1; if ($2 > size[$1]) size[$1] = $2 }
+    END { for (i = 1; i <= n; i++) printf "%-20s %6.1f\n", names[i], size[names[i]] }' "$out/sizes"
 
 echo
 echo "one control step (FK, J, J̇q̇, AHIC, ERC, RR, inverse dynamics)"

@@ -3,7 +3,7 @@
 //! C is fixed in the world, its z points into the surface. The whole law works in its axes, linear part first, moments
 //! about the tool point; the arm's model takes C for its base. Pure geometry: nothing here fails.
 
-use arm::{Jacobian, JointVector, Pose, Spatial, TipMotion, rotation};
+use arm::{Pose, Spatial, TipMotion, rotation};
 use nalgebra::{Matrix3, Vector3};
 
 /// Pose, twist and acceleration of one thing (X, X_d or Xᵗ), in C.
@@ -72,18 +72,6 @@ pub fn rotation_of_wxyz(q: [f64; 4]) -> Matrix3<f64> {
 
 /// The tool's kinematics in C, X, Ẋ = J q̇, J and J̇q̇: those of an arm seen from C.
 pub type TaskKinematics = TipMotion;
-
-/// Jᵀ F.
-pub fn transposed_times(jacobian: &Jacobian, f: &Spatial) -> JointVector {
-    let f = f.data.0[0];
-    JointVector::from(jacobian.data.0.map(|column| dot(&column, &f)))
-}
-
-/// Scalar product, in pairs, which the processor can add at the same time.
-#[inline(always)]
-pub fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
-    (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]) + (a[4] * b[4] + a[5] * b[5])
-}
 
 #[cfg(test)]
 mod tests {

@@ -6,12 +6,12 @@
 
 use crate::disturbance::Disturbance;
 use crate::findings::Findings;
-use crate::frame::{TaskKinematics, transposed_times};
+use crate::frame::TaskKinematics;
 use crate::handover::Wanted;
 use crate::pipeline::Mode;
 use crate::safety::State;
 use arm::drives::DriveData;
-use arm::{ArmState, DOF, JointVector, Spatial};
+use arm::{ArmState, DOF, JointVector, Spatial, transposed_times};
 use messages::Detector;
 use scenario::Scenario;
 

@@ -6,9 +6,9 @@
 //! the price of the gain σ²/(σ² + w_v) along a singular value σ. Directions without any weight get no acceleration.
 
 use crate::cholesky::{Cholesky, Row};
-use crate::frame::{TaskKinematics, dot, transposed_times};
+use crate::frame::TaskKinematics;
 use crate::joint_limits::LimitTask;
-use arm::{DOF, Jacobian, JointVector, Spatial};
+use arm::{DOF, Jacobian, JointVector, Spatial, dot, transposed_times};
 
 /// Weights of the least-squares problem.
 #[derive(Clone, Copy, Debug)]

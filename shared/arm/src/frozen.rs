@@ -4,8 +4,9 @@
 //! posture; the tip follows the joints along this Jacobian, so a force on the tip does the very work that the joints feel.
 
 use crate::kinematics::Pose;
+use crate::products::{combined, transposed_times};
 use crate::state::ArmState;
-use crate::{DOF, JointVector, Spatial};
+use crate::{DOF, Jacobian, JointVector, Spatial};
 use nalgebra::Vector3;
 
 /// Joints, and one more to fill pairs.
@@ -16,9 +17,8 @@ const ROWS: usize = DOF + 1;
 pub struct FrozenArm {
     q: JointVector,
     pose: Pose,
-    /// Columns of J.
-    jacobian: [[f64; 6]; DOF],
-    jdot_qd: [f64; 6],
+    jacobian: Jacobian,
+    jdot_qd: Spatial,
     /// C q̇ + g.
     bias: JointVector,
     /// Columns of the inverse of M + diag(armature).
@@ -37,8 +37,8 @@ impl FrozenArm {
         FrozenArm {
             q: *state.q(),
             pose: tip.pose,
-            jacobian: tip.jacobian.data.0,
-            jdot_qd: tip.jdot_qd.into(),
+            jacobian: tip.jacobian,
+            jdot_qd: tip.jdot_qd,
             bias,
             mobility: inverted(inertia),
         }
@@ -47,7 +47,7 @@ impl FrozenArm {
     /// Pose of the tip at angles `q` (rad) nearby.
     #[inline]
     pub fn pose(&self, q: &JointVector) -> Pose {
-        let [x, y, z, turn @ ..] = combined(&self.jacobian, &(q - self.q));
+        let [x, y, z, turn @ ..] = combined(&self.jacobian.data.0, &(q - self.q));
         let turn = Vector3::from(turn);
         let turned = |v: Vector3<f64>| {
             let change = turn.cross(&v);
@@ -64,41 +64,23 @@ impl FrozenArm {
     /// Twist of the tip at joint speeds `qd` (rad/s): J q̇ (m/s, rad/s; base axes).
     #[inline]
     pub fn twist(&self, qd: &JointVector) -> Spatial {
-        combined(&self.jacobian, qd).into()
+        combined(&self.jacobian.data.0, qd).into()
     }
 
     /// Acceleration of the tip under joint accelerations: J q̈ + J̇q̇ (m/s², rad/s²; base axes).
     #[inline]
     pub fn tip_acceleration(&self, qdd: &JointVector) -> Spatial {
-        Spatial::from(combined(&self.jacobian, qdd)) + Spatial::from(self.jdot_qd)
+        Spatial::from(combined(&self.jacobian.data.0, qdd)) + self.jdot_qd
     }
 
     /// q̈ of (M + diag(armature)) q̈ = τ + Jᵀ f_tip − C q̇ − g, for torques `tau` (Nm) and the wrench `f_tip` that acts ON the
     /// tip (N, Nm; base axes, at the tip).
     #[inline]
     pub fn accelerations(&self, tau: &JointVector, f_tip: &Spatial) -> JointVector {
-        let f: [f64; 6] = (*f_tip).into();
-        let mut left = tau - self.bias;
-        for (left, column) in left.iter_mut().zip(&self.jacobian) {
-            let [a, b, c] = [0, 2, 4].map(|k| [column[k] * f[k], column[k + 1] * f[k + 1]]);
-            let pair = [a[0] + b[0] + c[0], a[1] + b[1] + c[1]];
-            *left += pair[0] + pair[1];
-        }
+        let left = tau - self.bias + transposed_times(&self.jacobian, f_tip);
         let [qdd @ .., _] = combined(&self.mobility, &left);
         qdd.into()
     }
-}
-
-/// Sum of the columns times these factors.
-#[inline(always)]
-fn combined<const N: usize>(columns: &[[f64; N]; DOF], factors: &JointVector) -> [f64; N] {
-    let mut sum = [0.0; N];
-    for (column, factor) in columns.iter().zip(factors.iter()) {
-        for (sum, entry) in sum.iter_mut().zip(column) {
-            *sum += entry * factor;
-        }
-    }
-    sum
 }
 
 /// Inverse of a symmetric positive definite matrix (Gauss–Jordan in place, which then needs no pivoting).

@@ -15,6 +15,7 @@
 //! | `slide` | the one-axis test arm |
 //! | `drives` | gears, friction, amplifiers, brakes: data |
 //! | `mismatch` | a plant that differs from the controller's model |
+//! | `products` | with a Jacobian |
 //! | `lanes`, `sincos`, `exponential` | two joints at a time |
 //! | `rotation` | logarithm, exponential, orientation error, roll-pitch-yaw |
 
@@ -30,6 +31,7 @@ mod kinematics;
 mod lanes;
 mod mismatch;
 mod model;
+mod products;
 mod reach;
 mod rnea;
 pub mod rotation;
@@ -47,6 +49,7 @@ pub use kinematics::{Pose, TipMotion, forward_kinematics, jacobian, jdot_qd, joi
 pub use mismatch::Mismatch;
 pub use lanes::Pair;
 pub use model::{ArmModel, Tool};
+pub use products::{dot, transposed_times};
 pub use rnea::{bias, gravity_torque, rnea};
 pub use small::Real;
 pub use state::ArmState;

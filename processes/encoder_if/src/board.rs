@@ -11,7 +11,7 @@ use crate::velocity::{self, TIMER_NS};
 use board::{Board, Inputs, Outputs};
 use messages::registers::encoder;
 use messages::{BoardId, BusWord, Event, JOINTS, TransferRecord};
-use scenario::{FaultKind, Occurrence, Scenario, Site, VelocitySource, nanoseconds};
+use scenario::{ClockDrift, Scenario, VelocitySource, nanoseconds};
 use vme::Ns;
 
 /// Number of cards.
@@ -29,8 +29,8 @@ pub struct EncoderIf {
     channels: Channels,
     /// The channels have followed the shafts up to here.
     followed: f64,
-    /// When the cards' clock gains, from and until, and by which part of one.
-    drifts: Vec<(Ns, Ns, f64)>,
+    /// When the cards' clock is off.
+    drifts: Vec<ClockDrift>,
 }
 
 impl EncoderIf {
@@ -55,14 +55,14 @@ impl EncoderIf {
             history: History::new(&drives, delay + TIMER_NS, scenario.plant.rate_hz),
             channels: Channels::new(scenario, core::array::from_fn(|i| counts_per_turn(&drives, i))),
             followed: f64::NEG_INFINITY,
-            drifts: drifts(scenario),
+            drifts: scenario.clock_drifts().into_iter().filter(|drift| drift.board == BoardId::EncoderIf).collect(),
         })
     }
 
     /// How fast the cards' clock goes at `t`.
     fn clock_rate(&self, t: Ns) -> f64 {
-        let holding = self.drifts.iter().filter(|(from, until, _)| (*from..*until).contains(&t));
-        1.0 + holding.map(|(.., gain)| gain).sum::<f64>()
+        let holding = self.drifts.iter().filter(|drift| (drift.from..drift.until).contains(&t));
+        1.0 + holding.map(|drift| drift.gain).sum::<f64>()
     }
 
     /// Card and register offset behind an address.
@@ -156,16 +156,6 @@ impl EncoderIf {
     fn delayed(&self, t: Ns) -> f64 {
         t as f64 - self.delay as f64
     }
-}
-
-/// When the cards' clock drifts.
-fn drifts(scenario: &Scenario) -> Vec<(Ns, Ns, f64)> {
-    let drift = |occurrence: Occurrence| {
-        let fault = &scenario.faults[occurrence.fault];
-        let own = scenario.fault_site(occurrence.fault) == Ok(Site::Board(BoardId::EncoderIf));
-        (own && fault.kind == FaultKind::ClockDrift).then_some((occurrence.from, occurrence.until, fault.amount * 1e-6))
-    };
-    scenario.occurrences().into_iter().filter_map(drift).collect()
 }
 
 impl Board for EncoderIf {

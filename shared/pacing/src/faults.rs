@@ -3,7 +3,7 @@
 use board::BoardId;
 use channels::{Tamper, TamperKind, Tampering};
 use messages::{Event, Ns};
-use scenario::{Fault, FaultKind, Occurrence, Scenario, Site, nanoseconds};
+use scenario::{ClockDrift, Fault, FaultKind, Occurrence, Scenario, Site, nanoseconds};
 
 /// The planned faults of messages over the bus.
 pub(crate) fn tampering(scenario: &Scenario) -> Tampering {
@@ -64,29 +64,20 @@ impl Injections {
 /// The boards' own clocks, each as far off simulated time as planned.
 #[derive(Default)]
 pub(crate) struct Clocks {
-    /// Board, begin, end, and gain in parts of one.
-    drifts: Vec<(BoardId, Ns, Ns, f64)>,
+    drifts: Vec<ClockDrift>,
 }
 
 impl Clocks {
     /// Those of a scenario.
     pub fn new(scenario: &Scenario) -> Clocks {
-        let drift = |occurrence: Occurrence| {
-            let fault = &scenario.faults[occurrence.fault];
-            match scenario.fault_site(occurrence.fault) {
-                Ok(Site::Board(board)) if fault.kind == FaultKind::ClockDrift => {
-                    Some((board, occurrence.from, occurrence.until, fault.amount * 1e-6))
-                }
-                _ => None,
-            }
-        };
-        Clocks { drifts: scenario.occurrences().into_iter().filter_map(drift).collect() }
+        Clocks { drifts: scenario.clock_drifts() }
     }
 
     /// What the board's clock shows at simulated time `t`.
     pub fn show(&self, board: BoardId, t: Ns) -> Ns {
-        let of_board = self.drifts.iter().filter(|(drifting, from, ..)| *drifting == board && *from < t);
-        let gained: i64 = of_board.map(|(_, from, until, gain)| ((t.min(*until) - from) as f64 * gain).round() as i64).sum();
+        let of_board = self.drifts.iter().filter(|drift| drift.board == board && drift.from < t);
+        let gained: i64 =
+            of_board.map(|drift| ((t.min(drift.until) - drift.from) as f64 * drift.gain).round() as i64).sum();
         t.saturating_add_signed(gained)
     }
 

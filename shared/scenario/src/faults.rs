@@ -72,6 +72,19 @@ pub enum Site {
     Timing(vme::FaultKind),
 }
 
+/// The clock of a board gains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClockDrift {
+    /// Whose.
+    pub board: BoardId,
+    /// From then on, ns.
+    pub from: Ns,
+    /// Until then.
+    pub until: Ns,
+    /// Part of one.
+    pub gain: f64,
+}
+
 impl Scenario {
     /// When each fault holds, in the order of the faults, then of time.
     pub fn occurrences(&self) -> Vec<Occurrence> {
@@ -103,6 +116,20 @@ impl Scenario {
         planned.extend(caused);
         planned.extend(self.outage_faults());
         (vme::FaultPlan { faults: planned }, first)
+    }
+
+    /// When the boards' own clocks are off simulated time.
+    pub fn clock_drifts(&self) -> Vec<ClockDrift> {
+        let drift = |Occurrence { fault, from, until }: Occurrence| {
+            let stated = &self.faults[fault];
+            match self.fault_site(fault) {
+                Ok(Site::Board(board)) if stated.kind == FaultKind::ClockDrift => {
+                    Some(ClockDrift { board, from, until, gain: stated.amount * 1e-6 })
+                }
+                _ => None,
+            }
+        };
+        self.occurrences().into_iter().filter_map(drift).collect()
     }
 
     /// The accesses that carry this board's messages over the bus, twice each: reads of its slaves, writes of its tasks.

@@ -21,7 +21,7 @@ mod schedule;
 mod source;
 
 pub use check::warnings;
-pub use faults::{Occurrence, Site};
+pub use faults::{ClockDrift, Occurrence, Site};
 pub use error::{Problem, ScenarioError};
 pub use file::read_text;
 pub use load::{Document, load};

@@ -59,11 +59,12 @@ impl HwSim {
     pub fn new(scenario: &Scenario) -> Result<HwSim, String> {
         let (plant, state) = Plant::new(scenario)?;
         let integrator = scenario.plant.integrator;
-        let now = plant.evaluate(&state, &Actuation::SAFE);
+        let arm = plant.frozen(&state, 0.0);
+        let now = plant.evaluate_about(&arm, &state, &Actuation::SAFE);
         let grid = scenario::nanoseconds(1.0 / scenario.plant.rate_hz);
         let mut sim = HwSim {
             takes_changes: plant.joints == Joints::Flexible && integrator == Integrator::SemiImplicit,
-            arm: plant.frozen(&state, 0.0),
+            arm,
             frozen: grid * Ns::from(scenario.plant.frozen_steps),
             plant,
             task_frame: scenario.task_frame(),

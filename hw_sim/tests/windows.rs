@@ -4,6 +4,7 @@ mod common;
 
 use common::{Bench, free, scenario};
 use messages::{AmplifierCommand, EventKind, PlantSample, drive_status};
+use nalgebra::Vector3;
 use scenario::{Joints, Robot, Scenario};
 
 /// A mass of 10 kg on the slide, base z = 0.9 m − task z, rigid, nothing to touch.
@@ -68,6 +69,26 @@ fn cutting_windows_anywhere_gives_the_same_bits() {
         assert_eq!(cut.0, whole.0);
         assert_eq!(cut.1, whole.1);
     }
+}
+
+#[test]
+fn holding_the_arm_for_ten_steps_adds_less_than_a_tenth_to_the_steps_own_error() {
+    // the tool, mm, as the arm falls into the board
+    let track = |settings: &[&str]| -> Vec<Vector3<f64>> {
+        let mut bench = Bench::new(&scenario(settings));
+        bench.window(1, &[free(0, [0.0, -2.5, -0.3, 3.0, 0.5, 0.0, 0.0])]);
+        let mut place = || {
+            bench.run(0.005);
+            Vector3::from(bench.out.mail.plant_probe[0].position) * 1e3
+        };
+        (0..40).map(|_| place()).collect()
+    };
+    let [fine, renewed, held] =
+        [&["plant.integrator=rk4", "plant.rate_hz=50000.0"][..], &["plant.frozen_steps=1"], &["plant.frozen_steps=10"]].map(track);
+    let greatest = |a: &[Vector3<f64>], b: &[Vector3<f64>]| a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let (added, own) = (greatest(&held, &renewed), greatest(&renewed, &fine));
+    assert!((fine[39] - fine[0]).norm() > 10.0, "the arm moves: {}", fine[39] - fine[0]);
+    assert!(added > 0.0 && added < 0.1 * own, "{added} mm beside {own} mm");
 }
 
 #[test]

@@ -67,12 +67,12 @@ pub struct MeasuringCost {
 impl MeasuringCost {
     /// Compares stretches in the order of time; `None` where there is no pair.
     pub fn of(processes: &[Compared], stretches: &[Stretch], stretch_s: f64, period_ns: f64) -> Option<MeasuringCost> {
-        let of_pair = |pair: &[Stretch]| match pair {
-            [with, without] if with.measured && !without.measured => Some([with.clone(), without.clone()]),
-            [without, with] if with.measured && !without.measured => Some([with.clone(), without.clone()]),
+        let of_pair = stretches.chunks(2).filter_map(|pair| match pair {
+            // the guard is asked in both orders
+            [with, without] | [without, with] if with.measured && !without.measured => Some([with, without]),
             _ => None,
-        };
-        let pairs: Vec<[Stretch; 2]> = stretches.chunks(2).filter_map(of_pair).collect();
+        });
+        let pairs: Vec<[&Stretch; 2]> = of_pair.collect();
         if pairs.is_empty() {
             return None;
         }

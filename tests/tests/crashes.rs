@@ -23,16 +23,25 @@ const REAL_TIME: Pace = &["--pacing", "realtime"];
 
 /// Starts a run that would last very long, and lets it go on for `delay` after its processes have started.
 fn start(bench: &Bench, delay: Duration) -> Running {
-    start_for(bench, "30000", LOCK_STEP, delay)
+    let mut run = start_for(bench, without_end(LOCK_STEP), LOCK_STEP);
+    run.pause(delay);
+    run
 }
 
-/// The same with so many simulated seconds, at that pace.
-fn start_for(bench: &Bench, seconds: &str, pace: Pace, delay: Duration) -> Running {
+/// A length that no run here comes to the end of; in real time, it is what a run locks memory for.
+fn without_end(pace: Pace) -> &'static str {
+    if pace == REAL_TIME { "100" } else { "30000" }
+}
+
+/// Starts a run of so many simulated seconds, at that pace; in real time, waits until it runs.
+fn start_for(bench: &Bench, seconds: &str, pace: Pace) -> Running {
     let scenario = bench.scenario("long.toml", &[]);
     let line = ["run", scenario, "--duration", seconds, "--out", "out"];
     let mut run = bench.start(&[&line, pace].concat());
     run.wait_for_processes(NEEDED.len() + DISPENSABLE.len());
-    run.pause(delay);
+    if pace == REAL_TIME {
+        run.wait_until_it_runs();
+    }
     run
 }
 
@@ -82,12 +91,7 @@ fn victim(run: &Running, name: &str) -> u32 {
 /// Sends a process that control needs the signal, `delay` after the start: the run ends with its name.
 fn harm(name: &str, with: Signal, pace: Pace, delay: Duration) {
     let bench = Bench::new();
-    // the length in real time is what a run locks memory for
-    let seconds = if pace == REAL_TIME { "100" } else { "30000" };
-    let mut run = start_for(&bench, seconds, pace, Duration::ZERO);
-    if pace == REAL_TIME {
-        run.wait_until_it_runs();
-    }
+    let mut run = start_for(&bench, without_end(pace), pace);
     run.pause(delay);
     let pid = victim(&run, name);
     run.mark();
@@ -110,10 +114,8 @@ fn harm_and_go_on(name: &str, with: Signal, pace: Pace, delay: Duration) {
     let bench = Bench::new();
     // in lock step as long as it takes for the signal to come in time
     let seconds = if pace == REAL_TIME { "4" } else { "40" };
-    let mut run = start_for(&bench, seconds, pace, Duration::ZERO);
-    if pace == REAL_TIME {
-        run.wait_until_it_runs();
-    } else {
+    let mut run = start_for(&bench, seconds, pace);
+    if pace == LOCK_STEP {
         wait_for_record(&bench);
     }
     run.pause(delay);
@@ -163,11 +165,8 @@ fn ten_draws_of_the_kill_matrix_in_real_time_end_safely() {
 /// The chassis itself: killed, whether it runs or is stopped, it leaves a record that is whole up to there, and nothing else.
 fn harm_the_chassis(with: Signal, pace: Pace, delay: Duration) {
     let bench = Bench::new();
-    let seconds = if pace == REAL_TIME { "100" } else { "30000" };
-    let mut run = start_for(&bench, seconds, pace, Duration::ZERO);
-    if pace == REAL_TIME {
-        run.wait_until_it_runs();
-    } else {
+    let mut run = start_for(&bench, without_end(pace), pace);
+    if pace == LOCK_STEP {
         wait_for_record(&bench);
     }
     run.pause(delay);
@@ -216,8 +215,7 @@ fn in_lock_step_simulated_time_stands_still_with_a_stopped_chassis_and_the_diges
 #[test]
 fn in_real_time_a_chassis_that_was_stopped_ends_the_run_with_its_name_once_it_goes_on() {
     let bench = Bench::new();
-    let mut run = start_for(&bench, "100", REAL_TIME, Duration::ZERO);
-    run.wait_until_it_runs();
+    let mut run = start_for(&bench, without_end(REAL_TIME), REAL_TIME);
     run.pause(Duration::from_millis(500));
     stop_and_continue(&mut run, Duration::from_millis(1500));
     run.mark();
@@ -231,10 +229,7 @@ fn in_real_time_a_chassis_that_was_stopped_ends_the_run_with_its_name_once_it_go
 fn a_chassis_that_is_told_to_go_on_but_was_not_stopped_goes_on() {
     for pace in [LOCK_STEP, REAL_TIME] {
         let bench = Bench::new();
-        let mut run = start_for(&bench, "2", pace, Duration::ZERO);
-        if pace == REAL_TIME {
-            run.wait_until_it_runs();
-        }
+        let run = start_for(&bench, "2", pace);
         signal(run.pid(), Signal::CONT);
         run.wait().expect_code(0).expect_nothing_left();
     }
